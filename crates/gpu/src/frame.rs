@@ -1,0 +1,396 @@
+//! A plan bound to a device. Running it records and submits one command buffer; it knows no pass by name.
+
+use std::{collections::BTreeMap, time::Instant};
+
+use manylight_graph::{
+    plan::{Plan, PlanNode, PlanStep, ResourceIx, Target},
+    shader::Shader,
+    value::ResourceDesc,
+};
+
+use crate::{
+    bind::{Finder, Groups, Own, StepLayout},
+    device::Gpu,
+    error::{Fault, RunError},
+    externals::{Externals, write_padded},
+    format::describe,
+    host::{HostBytes, HostContext, HostData, SharedHost},
+    poison::{Fill, Poison},
+    pool::{Memory, Place, Resource},
+    timing::{FrameTimings, Timer},
+};
+
+/// Colour targets that WebGPU allows at most.
+pub(crate) const MOST_TARGETS: usize = 8;
+
+/// A plan bound to a device: pipelines, bind groups, memory and timers.
+pub struct Frame {
+    pub(crate) plan: Plan,
+    pub(crate) resources: Vec<Resource>,
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) externals: Vec<UsedExternal>,
+    pub(crate) host_bytes: BTreeMap<ResourceIx, HostBytes>,
+    pub(crate) poison: Option<Poison>,
+    pub(crate) timer: Timer,
+    /// Frames run so far; its lowest bit chooses the copy of each history.
+    pub(crate) index: u64,
+}
+
+/// What a node of the plan became.
+pub(crate) struct Node {
+    pub(crate) own: Own,
+    pub(crate) passes: Vec<Pass>,
+    pub(crate) host: Option<Host>,
+    /// Resources that this node is the first to touch.
+    pub(crate) poisons: Vec<Fill>,
+}
+
+pub(crate) enum Pass {
+    Compute(Vec<Dispatch>),
+    Draw(Draw),
+}
+
+/// Bind groups of a step for frames of even and odd index.
+pub(crate) struct Bindings {
+    pub(crate) layout: StepLayout,
+    pub(crate) mip: Option<(String, u32)>,
+    pub(crate) groups: [Groups; 2],
+}
+
+pub(crate) struct Dispatch {
+    pub(crate) pipeline: wgpu::ComputePipeline,
+    pub(crate) bindings: Bindings,
+    pub(crate) groups: [u32; 3],
+}
+
+pub(crate) struct Draw {
+    pub(crate) pipeline: wgpu::RenderPipeline,
+    pub(crate) bindings: Bindings,
+    pub(crate) vertices: u32,
+    /// Views for frames of even and odd index, and whether the target is cleared.
+    pub(crate) targets: Vec<([wgpu::TextureView; 2], bool)>,
+    pub(crate) depth: Option<([wgpu::TextureView; 2], bool)>,
+}
+
+pub(crate) struct Host {
+    pub(crate) node: SharedHost,
+    pub(crate) outputs: Vec<ResourceIx>,
+    /// Names of externals it reads.
+    pub(crate) externals: Vec<String>,
+    /// Outputs of other host nodes it reads.
+    pub(crate) inputs: Vec<ResourceIx>,
+    /// What it depended on when it last ran.
+    pub(crate) ran_with: Option<u64>,
+}
+
+/// An external as the bind groups know it.
+pub(crate) struct UsedExternal {
+    pub(crate) resource: ResourceIx,
+    pub(crate) bound: Memory,
+}
+
+impl std::fmt::Debug for Frame {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Frame").field("nodes", &self.nodes.len()).field("index", &self.index).finish_non_exhaustive()
+    }
+}
+
+impl Frame {
+    /// The plan it was built from.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Frames run so far, counted from the first that was built with this history.
+    pub fn index(&self) -> u64 {
+        self.index
+    }
+
+    /// Memory of a resource of the plan, as the latest frame left it. `None` for externals and for names that the plan does
+    /// not use. A transient's memory may hold another resource by then: name it in `PlanInput::keep` to read it.
+    pub fn memory(&self, name: &str) -> Option<&Memory> {
+        let ix = self.plan.resource(name)?;
+        self.resources[ix].memory(self.latest_parity())
+    }
+
+    /// The picture to show (display-referred).
+    pub fn presented(&self) -> Option<&wgpu::Texture> {
+        self.resources.get(self.plan.presents)?.memory(self.latest_parity())?.texture()
+    }
+
+    /// Linear radiance before tone mapping, when the pipeline names it.
+    pub fn radiance(&self) -> Option<&wgpu::Texture> {
+        self.resources.get(self.plan.radiance?)?.memory(self.latest_parity())?.texture()
+    }
+
+    /// Times of the newest frame whose timestamps have arrived; `None` until there is one. Never waits.
+    pub fn timings(&self) -> Option<&FrameTimings> {
+        self.timer.latest()
+    }
+
+    /// Waits for the frames under way and returns the times of the newest.
+    pub fn wait_timings(&mut self, gpu: &Gpu) -> Option<&FrameTimings> {
+        gpu.wait();
+        self.timer.collect();
+        self.timer.latest()
+    }
+
+    /// Runs the host nodes whose inputs changed, records the frame and submits it. Never waits for the GPU.
+    pub fn record_and_submit(&mut self, gpu: &Gpu, externals: &Externals, data: HostData<'_>) -> Result<(), RunError> {
+        if let Some(reason) = gpu.lost() {
+            return Err(RunError::Lost(reason));
+        }
+        let errors_before = gpu.error_count();
+        let start = Instant::now();
+        self.follow_externals(gpu, externals)?;
+        self.run_hosts(gpu, externals, data)?;
+        self.timer.begin();
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("frame") };
+        let mut encoder = gpu.device().create_command_encoder(&descriptor);
+        self.encode(&mut encoder, self.parity());
+        self.timer.resolve(&mut encoder);
+        gpu.queue().submit([encoder.finish()]);
+        let cpu_ns = nanoseconds(start);
+        self.timer.submitted(self.index, cpu_ns);
+        self.index += 1;
+        if gpu.error_count() != errors_before {
+            return Err(RunError::Gpu(gpu.take_errors().join("; ")));
+        }
+        Ok(())
+    }
+
+    pub(crate) fn parity(&self) -> usize {
+        (self.index & 1) as usize
+    }
+
+    fn latest_parity(&self) -> usize {
+        (self.index.wrapping_sub(1) & 1) as usize
+    }
+
+    /// Records all nodes.
+    pub(crate) fn encode(&mut self, encoder: &mut wgpu::CommandEncoder, parity: usize) {
+        let Self { plan, nodes, timer, poison, .. } = self;
+        for (ix, (node, planned)) in nodes.iter().zip(&plan.nodes).enumerate() {
+            if node.passes.is_empty() {
+                continue;
+            }
+            let start = Instant::now();
+            let id = planned.id.as_str();
+            let _span = tracing::info_span!("node", node = id, stage = planned.stage.as_str()).entered();
+            if let Some(poison) = poison {
+                for fill in &node.poisons {
+                    poison.fill(encoder, fill);
+                }
+            }
+            let span = timer.span(ix);
+            let last = node.passes.len() - 1;
+            for (i, pass) in node.passes.iter().enumerate() {
+                let stamps = span.filter(|_| i == 0 || i == last);
+                let stamps = stamps.map(|(set, begin, end)| (set, (i == 0).then_some(begin), (i == last).then_some(end)));
+                match pass {
+                    Pass::Compute(steps) => compute(encoder, id, steps, parity, stamps),
+                    Pass::Draw(step) => draw(encoder, id, step, parity, stamps),
+                }
+            }
+            timer.set_cpu(ix, nanoseconds(start));
+        }
+    }
+
+    /// Binds externals whose memory was replaced since the bind groups were made.
+    fn follow_externals(&mut self, gpu: &Gpu, externals: &Externals) -> Result<(), Fault> {
+        let mut moved = Vec::new();
+        for used in &self.externals {
+            let planned = &self.plan.resources[used.resource];
+            let Some(memory) = externals.memory(&planned.name) else {
+                return Err(Fault::MissingExternal { name: planned.name.clone() });
+            };
+            if *memory != used.bound {
+                check_external(externals, &planned.name, &planned.desc)?;
+                moved.push(used.resource);
+            }
+        }
+        if moved.is_empty() {
+            return Ok(());
+        }
+        let finder = Finder { gpu, resources: &self.resources, externals };
+        for (node, planned) in self.nodes.iter_mut().zip(&self.plan.nodes) {
+            let reads = |target: &Target| matches!(target, Target::Resource(ix) if moved.contains(ix));
+            if let Some(shader) = &planned.decl.shader
+                && planned.bindings.iter().any(|(_, target)| reads(target))
+            {
+                rebind(node, planned, shader, finder).map_err(|(entry, message)| Fault::Binding {
+                    node: planned.id.clone(),
+                    entry,
+                    message,
+                })?;
+            }
+        }
+        for used in &mut self.externals {
+            if let Some(memory) = externals.memory(&self.plan.resources[used.resource].name) {
+                used.bound = memory.clone();
+            }
+        }
+        Ok(())
+    }
+
+    fn run_hosts(&mut self, gpu: &Gpu, externals: &Externals, data: HostData<'_>) -> Result<(), RunError> {
+        let parity = self.parity();
+        let Self { plan, nodes, timer, host_bytes, resources, index, .. } = self;
+        for (ix, (node, planned)) in nodes.iter_mut().zip(&plan.nodes).enumerate() {
+            let Some(host) = &mut node.host else { continue };
+            let start = Instant::now();
+            let _span = tracing::info_span!("node", node = planned.id.as_str(), stage = planned.stage.as_str()).entered();
+            let mut running = host.node.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let stamp = dependencies(host, externals, host_bytes, data);
+            let due = host.ran_with != Some(stamp) || running.every_frame();
+            if due {
+                let mut ctx = HostContext { node: planned, data, frame: *index, stamp, buffers: host_bytes };
+                host.ran_with = None;
+                running.run(&mut ctx).map_err(|source| RunError::Host { node: planned.id.clone(), source })?;
+                host.ran_with = Some(stamp);
+            }
+            for output in &host.outputs {
+                let Some(bytes) = host_bytes.get_mut(output) else {
+                    continue;
+                };
+                bytes.stamp += u64::from(due);
+                // The copies of a history must both follow.
+                let swaps = matches!(resources[*output].place, Place::History(_));
+                if let Some(Memory::Buffer(buffer)) = resources[*output].memory(parity)
+                    && (due || swaps)
+                {
+                    write_padded(gpu, buffer, &bytes.bytes);
+                }
+            }
+            timer.set_cpu(ix, nanoseconds(start));
+        }
+        Ok(())
+    }
+}
+
+/// Whether an external still is what the plan was made for; only the number of elements of a buffer may differ.
+pub(crate) fn check_external(externals: &Externals, name: &str, planned: &ResourceDesc) -> Result<(), Fault> {
+    let Some(now) = externals.desc(name) else {
+        return Err(Fault::MissingExternal { name: name.to_owned() });
+    };
+    let same = match (now, planned) {
+        (ResourceDesc::Buffer { element: a, stride: x, .. }, ResourceDesc::Buffer { element: b, stride: y, .. }) => a == b && x == y,
+        (ResourceDesc::Texture { format: f, array: a, .. }, ResourceDesc::Texture { format: g, array: b, .. }) => f == g && a == b,
+        (a, b) => a == b,
+    };
+    if same {
+        return Ok(());
+    }
+    Err(Fault::WrongExternal { name: name.to_owned(), expected: describe(planned), actual: describe(now) })
+}
+
+/// Makes the bind groups of a node anew. An error names the entry point.
+fn rebind(node: &mut Node, planned: &PlanNode, shader: &Shader, finder: Finder<'_>) -> Result<(), (String, String)> {
+    let mut steps = planned.steps.iter();
+    let Node { own, passes, .. } = node;
+    let all = passes.iter_mut().flat_map(|pass| -> Vec<&mut Bindings> {
+        match pass {
+            Pass::Compute(steps) => steps.iter_mut().map(|s| &mut s.bindings).collect(),
+            Pass::Draw(step) => vec![&mut step.bindings],
+        }
+    });
+    for bindings in all {
+        let mip = bindings.mip.as_ref().map(|(port, level)| (port.as_str(), *level));
+        let entry = entry_of(steps.next());
+        let groups = |parity| finder.groups(planned, shader, own, &bindings.layout, mip, parity);
+        let made = groups(0).and_then(|even| Ok([even, groups(1)?]));
+        bindings.groups = made.map_err(|message| (entry, message))?;
+    }
+    Ok(())
+}
+
+pub(crate) fn entry_of(step: Option<&PlanStep>) -> String {
+    match step {
+        Some(PlanStep::Compute { entry, .. }) => entry.clone(),
+        Some(PlanStep::Draw { vertex, fragment, .. }) => format!("{vertex} + {fragment}"),
+        None => String::new(),
+    }
+}
+
+/// A number that changes whenever something that a host node depends on changes.
+fn dependencies(host: &Host, externals: &Externals, bytes: &BTreeMap<ResourceIx, HostBytes>, data: HostData<'_>) -> u64 {
+    use std::hash::{DefaultHasher, Hash, Hasher};
+    let mut hasher = DefaultHasher::new();
+    (data.scene.is_some(), data.stamp).hash(&mut hasher);
+    for name in &host.externals {
+        externals.stamp(name).hash(&mut hasher);
+    }
+    for input in &host.inputs {
+        bytes.get(input).map(|b| b.stamp).hash(&mut hasher);
+    }
+    hasher.finish()
+}
+
+fn nanoseconds(since: Instant) -> u64 {
+    u64::try_from(since.elapsed().as_nanos()).unwrap_or(u64::MAX)
+}
+
+type Stamps<'a> = Option<(&'a wgpu::QuerySet, Option<u32>, Option<u32>)>;
+
+fn compute(encoder: &mut wgpu::CommandEncoder, label: &str, steps: &[Dispatch], parity: usize, stamps: Stamps<'_>) {
+    let timestamp_writes = stamps.map(|(query_set, begin, end)| wgpu::ComputePassTimestampWrites {
+        query_set,
+        beginning_of_pass_write_index: begin,
+        end_of_pass_write_index: end,
+    });
+    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes });
+    let mut before: Option<&Dispatch> = None;
+    for step in steps {
+        if before.is_none_or(|b| b.pipeline != step.pipeline) {
+            pass.set_pipeline(&step.pipeline);
+        }
+        let groups = &step.bindings.groups[parity];
+        // Steps that share a layout and are repeated share their bind groups.
+        if before.is_none_or(|b| b.bindings.groups[parity] != *groups) {
+            for (index, group) in groups {
+                pass.set_bind_group(*index, group, &[]);
+            }
+        }
+        let [x, y, z] = step.groups;
+        pass.dispatch_workgroups(x, y, z);
+        before = Some(step);
+    }
+}
+
+fn draw(encoder: &mut wgpu::CommandEncoder, label: &str, step: &Draw, parity: usize, stamps: Stamps<'_>) {
+    let mut colors = [const { None }; MOST_TARGETS];
+    for (slot, (views, clear)) in colors.iter_mut().zip(&step.targets) {
+        let load = if *clear { wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { wgpu::LoadOp::Load };
+        *slot = Some(wgpu::RenderPassColorAttachment {
+            view: &views[parity],
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
+        });
+    }
+    let depth = step.depth.as_ref().map(|(views, clear)| {
+        let load = if *clear { wgpu::LoadOp::Clear(0.0) } else { wgpu::LoadOp::Load };
+        wgpu::RenderPassDepthStencilAttachment {
+            view: &views[parity],
+            depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
+            stencil_ops: None,
+        }
+    });
+    let timestamp_writes = stamps.map(|(query_set, begin, end)| wgpu::RenderPassTimestampWrites {
+        query_set,
+        beginning_of_pass_write_index: begin,
+        end_of_pass_write_index: end,
+    });
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(label),
+        color_attachments: &colors[..step.targets.len()],
+        depth_stencil_attachment: depth,
+        timestamp_writes,
+        ..Default::default()
+    });
+    pass.set_pipeline(&step.pipeline);
+    for (index, group) in &step.bindings.groups[parity] {
+        pass.set_bind_group(*index, group, &[]);
+    }
+    pass.draw(0..step.vertices, 0..1);
+}

@@ -1,0 +1,412 @@
+//! Composes WGSL files with their imports into one naga module, with faults pointing into the file they are in.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    hash::{DefaultHasher, Hash, Hasher},
+    ops::Range,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::Arc,
+};
+
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga_oil::compose::{ComposableModuleDescriptor, Composer, ComposerError, ComposerErrorInner, ErrSource, NagaModuleDescriptor};
+
+use crate::{
+    diagnostics::{Diagnostic, Source, Span},
+    reflect::demangle,
+    render::suggest,
+    wgsl::{self, Scan},
+};
+
+/// naga_oil keeps the module number above this bit of a span.
+const SPAN_SHIFT: usize = 21;
+
+/// A file of `shaders/common/`.
+#[derive(Debug)]
+pub(crate) struct Module {
+    pub source: Arc<Source>,
+    /// Path in the library.
+    pub path: String,
+    scan: Scan,
+    /// Modules that it imports, directly or not, by name.
+    imports: BTreeSet<String>,
+    /// It, or something that it imports, has faults, which are reported.
+    faulty: bool,
+    /// Hash of its text and its imports.
+    hash: u64,
+}
+
+/// All modules of `shaders/common/`, and the composer that knows them.
+pub(crate) struct Composition {
+    pub modules: BTreeMap<String, Module>,
+    composer: Option<Composer>,
+    /// Names in the order in which naga_oil needs them.
+    order: Vec<String>,
+}
+
+/// A text with its imports resolved.
+pub(crate) struct Resolved {
+    pub scan: Scan,
+    pub imports: BTreeSet<String>,
+    pub hash: u64,
+    /// It imports something faulty: nothing is to be said about it.
+    pub faulty: bool,
+}
+
+impl Composition {
+    /// Takes in all modules and checks each by itself, save those whose hash is in `known_good`.
+    pub fn new(sources: Vec<(String, Arc<Source>)>, known_good: &BTreeSet<u64>, out: &mut Vec<Diagnostic>) -> Self {
+        let mut modules = BTreeMap::new();
+        for (path, source) in sources {
+            let name = path.trim_start_matches("shaders/").trim_end_matches(".wgsl").replace('/', "::");
+            let scan = wgsl::scan(&source.text);
+            modules.insert(name, Module { source, path, scan, imports: BTreeSet::new(), faulty: false, hash: 0 });
+        }
+        let mut this = Self { modules, composer: None, order: Vec::new() };
+        let mut direct = BTreeMap::new();
+        for name in this.modules.keys().cloned().collect::<Vec<_>>() {
+            let module = &this.modules[&name];
+            let before = out.len();
+            check_common(module, out);
+            let found = this.direct_imports(&module.source, &module.scan, out);
+            let faulty = out.len() > before;
+            direct.insert(name.clone(), found);
+            if let Some(module) = this.modules.get_mut(&name) {
+                module.faulty = faulty;
+            }
+        }
+        this.sort(&direct, out);
+        this.settle(&direct);
+        for name in this.order.clone() {
+            let module = &this.modules[&name];
+            if module.faulty || known_good.contains(&module.hash) {
+                continue;
+            }
+            let (source, path) = (Arc::clone(&module.source), module.path.clone());
+            if let Err(faults) = this.compose(&source, &path, &module_needs(&this.modules[&name])) {
+                out.extend(faults);
+                this.mark_faulty(&name);
+            }
+        }
+        this
+    }
+
+    /// Hashes of the modules without faults.
+    pub fn good(&self) -> BTreeSet<u64> {
+        self.modules.values().filter(|m| !m.faulty).map(|m| m.hash).collect()
+    }
+
+    /// Resolves the imports of a text that is not a module itself.
+    pub fn resolve(&self, source: &Arc<Source>, out: &mut Vec<Diagnostic>) -> Resolved {
+        let scan = wgsl::scan(&source.text);
+        let before = out.len();
+        let direct = self.direct_imports(source, &scan, out);
+        let mut imports = direct.clone();
+        for name in &direct {
+            imports.extend(self.modules[name].imports.iter().cloned());
+        }
+        let faulty = out.len() > before || imports.iter().any(|name| self.modules[name].faulty);
+        let hash = self.hash(&source.text, &imports);
+        Resolved { scan, imports, hash, faulty }
+    }
+
+    /// The module that a path names or lies in, and the item in it.
+    fn module_of<'a>(&self, path: &'a str) -> Option<(String, Option<&'a str>)> {
+        if self.modules.contains_key(path) {
+            return Some((path.to_owned(), None));
+        }
+        let (module, item) = path.rsplit_once("::")?;
+        self.modules.contains_key(module).then(|| (module.to_owned(), Some(item)))
+    }
+
+    fn direct_imports(&self, source: &Arc<Source>, scan: &Scan, out: &mut Vec<Diagnostic>) -> BTreeSet<String> {
+        let mut found = BTreeSet::new();
+        let mut named: BTreeSet<&str> = BTreeSet::new();
+        for path in &scan.paths {
+            if !path.import {
+                continue;
+            }
+            let span = Span::new(source, path.range.clone());
+            match self.module_of(&path.text) {
+                Some((module, None)) => {
+                    found.insert(module);
+                }
+                Some((module, Some(item))) => {
+                    let items = &self.modules[&module].scan.items;
+                    if !items.iter().any(|i| i.name == item) {
+                        let known = items.iter().map(|i| i.name.as_str());
+                        out.push(Diagnostic::error(format!("`{module}` has no item `{item}`"), span).help(suggest(item, known)));
+                    }
+                    found.insert(module);
+                }
+                None => {
+                    let module = path.text.rsplit_once("::").map_or(path.text.as_str(), |(module, _)| module);
+                    if named.insert(module) {
+                        let help = suggest(module, self.modules.keys().map(String::as_str));
+                        out.push(
+                            Diagnostic::error(format!("there is no module `{module}`"), span)
+                                .help(format!("{help} A file `shaders/common/x.wgsl` is the module `common::x`")),
+                        );
+                    }
+                }
+            }
+        }
+        // Paths in code may name a module without an import line.
+        for path in scan.paths.iter().filter(|p| !p.import) {
+            found.extend(self.module_of(&path.text).map(|(module, _)| module));
+        }
+        found
+    }
+
+    /// Orders the modules; those in or behind a cycle are faulty and left out.
+    fn sort(&mut self, direct: &BTreeMap<String, BTreeSet<String>>, out: &mut Vec<Diagnostic>) {
+        let mut done: BTreeSet<&String> = BTreeSet::new();
+        loop {
+            let ready: Vec<&String> =
+                direct.iter().filter(|(name, needs)| !done.contains(name) && needs.iter().all(|n| done.contains(n))).map(|(n, _)| n).collect();
+            if ready.is_empty() {
+                break;
+            }
+            self.order.extend(ready.iter().map(|n| (*n).clone()));
+            done.extend(ready);
+        }
+        let left: BTreeSet<&String> = direct.keys().filter(|name| !done.contains(name)).collect();
+        let Some(mut at) = left.first().copied() else { return };
+        // Every module that is left needs one that is left: walking on must meet a module twice.
+        let mut walk = Vec::new();
+        while !walk.contains(&at) {
+            walk.push(at);
+            match direct[at].iter().find(|n| left.contains(n)) {
+                Some(next) => at = next,
+                None => break,
+            }
+        }
+        let start = walk.iter().position(|n| *n == at).unwrap_or(0);
+        let cycle = &walk[start..];
+        let shown: Vec<&str> = cycle.iter().map(|n| n.as_str()).chain(cycle.first().map(|n| n.as_str())).collect();
+        let place = |from: &str, to: &str| {
+            let module = &self.modules[from];
+            let range = module.scan.paths.iter().find(|p| p.text == to || p.text.starts_with(&format!("{to}::"))).map_or(0..0, |p| p.range.clone());
+            Span::new(&module.source, range)
+        };
+        if let [first, second, ..] = shown.as_slice() {
+            let mut fault = Diagnostic::error(format!("modules import each other in a circle: {}", shown.join(" → ")), place(first, second));
+            for pair in shown.windows(2).skip(1) {
+                fault = fault.and(place(pair[0], pair[1]), format!("`{}` imports `{}`", pair[0], pair[1]));
+            }
+            out.push(fault.help("move what they share into a module of its own"));
+        }
+        let left: Vec<String> = left.into_iter().cloned().collect();
+        for name in left {
+            if let Some(module) = self.modules.get_mut(&name) {
+                module.faulty = true;
+            }
+        }
+    }
+
+    /// Computes transitive imports and hashes in order, and passes faults on to importers.
+    fn settle(&mut self, direct: &BTreeMap<String, BTreeSet<String>>) {
+        for name in self.order.clone() {
+            let mut imports = direct[&name].clone();
+            for import in &direct[&name] {
+                imports.extend(self.modules[import].imports.iter().cloned());
+            }
+            let faulty = imports.iter().any(|i| self.modules[i].faulty);
+            let hash = self.hash(&self.modules[&name].source.text, &imports);
+            if let Some(module) = self.modules.get_mut(&name) {
+                module.faulty |= faulty;
+                module.imports = imports;
+                module.hash = hash;
+            }
+        }
+    }
+
+    fn mark_faulty(&mut self, name: &str) {
+        for (other, module) in &mut self.modules {
+            module.faulty |= other == name || module.imports.contains(name);
+        }
+    }
+
+    fn hash(&self, text: &str, imports: &BTreeSet<String>) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        text.hash(&mut hasher);
+        for import in imports {
+            import.hash(&mut hasher);
+            self.modules[import].source.text.hash(&mut hasher);
+        }
+        hasher.finish()
+    }
+
+    /// Composes a text; its imports must be without faults.
+    pub fn compose(&mut self, source: &Arc<Source>, path: &str, imports: &BTreeSet<String>) -> Result<(naga::Module, ModuleInfo), Vec<Diagnostic>> {
+        let mut composer = self.composer.take().unwrap_or_else(|| Composer::default().with_capabilities(Capabilities::all()));
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            for name in self.order.iter().filter(|name| imports.contains(*name)) {
+                if composer.contains_module(name) {
+                    continue;
+                }
+                let module = &self.modules[name];
+                let description = ComposableModuleDescriptor {
+                    source: &module.source.text,
+                    file_path: &module.path,
+                    as_name: Some(name.clone()),
+                    ..Default::default()
+                };
+                if let Err(error) = composer.add_composable_module(description) {
+                    return Err(self.explain(&composer, source, path, &error));
+                }
+            }
+            let description = NagaModuleDescriptor { source: &source.text, file_path: path, ..Default::default() };
+            composer.make_naga_module(description).map_err(|error| self.explain(&composer, source, path, &error))
+        }));
+        let Ok(outcome) = outcome else {
+            let fault = Diagnostic::error("the shader cannot be composed", Span::new(source, 0..0))
+                .help("its imports or preprocessor lines have a form that the composer does not understand");
+            return Err(vec![fault]);
+        };
+        self.composer = Some(composer);
+        let module = outcome.map_err(|fault| vec![fault])?;
+        match Validator::new(ValidationFlags::all(), Capabilities::all()).validate(&module) {
+            Ok(info) => Ok((module, info)),
+            Err(error) => {
+                let message = format!("the shader is not valid: {}", self.undecorate(&chain(&error)));
+                Err(vec![Diagnostic::error(message, Span::new(source, 0..0))])
+            }
+        }
+    }
+
+    /// Turns the composer's error into a diagnostic in the right file.
+    fn explain(&self, composer: &Composer, source: &Arc<Source>, path: &str, error: &ComposerError) -> Diagnostic {
+        let (file, module_index) = match &error.source {
+            ErrSource::Module { name, .. } => match self.modules.get(name) {
+                Some(module) => {
+                    let index = composer.module_index.iter().find(|(_, n)| *n == name).map_or(0, |(i, _)| *i);
+                    (&module.source, index)
+                }
+                None => (source, 0),
+            },
+            ErrSource::Constructing { path: at, .. } => match self.modules.values().find(|m| m.path == *at && m.path != path) {
+                Some(module) => (&module.source, 0),
+                None => (source, 0),
+            },
+        };
+        let replaced = error.source.source(composer);
+        let offset = error.source.offset();
+        let place = |range: Range<usize>| {
+            let local = |at: usize| (at & ((1 << SPAN_SHIFT) - 1)).saturating_sub(offset);
+            let start = wgsl::original_offset(&file.text, &replaced, local(range.start));
+            let end = wgsl::original_offset(&file.text, &replaced, local(range.end)).max(start);
+            Span::new(file, start..end)
+        };
+        let at = |position: usize| Span::new(file, { let p = wgsl::original_offset(&file.text, &replaced, position); p..p });
+        match &error.inner {
+            ComposerErrorInner::WgslParseError(e) => {
+                let labels = e.labels().map(|(span, text)| (span.to_range().unwrap_or(0..0), text.to_owned())).collect();
+                self.labelled(self.undecorate(e.message()), labels, &place, file)
+            }
+            ComposerErrorInner::HeaderValidationError(e) | ComposerErrorInner::ShaderValidationError(e) => {
+                let labels = e
+                    .spans()
+                    .filter_map(|(span, text)| Some((span.to_range()?, text.clone())))
+                    .filter(|(range, _)| matches!(range.start >> SPAN_SHIFT, 0) || range.start >> SPAN_SHIFT == module_index)
+                    .collect();
+                self.labelled(self.undecorate(&chain(e.as_inner())), labels, &place, file)
+            }
+            ComposerErrorInner::ImportNotFound(name, position) => {
+                let help = suggest(name, self.modules.keys().map(String::as_str));
+                Diagnostic::error(format!("there is no module `{name}`"), at(*position)).help(help)
+            }
+            ComposerErrorInner::ImportParseError(message, position) => {
+                Diagnostic::error(format!("the import cannot be read: {message}"), at(*position)).help("write `#import common::file::{a, b}`")
+            }
+            ComposerErrorInner::InvalidIdentifier { original, at: span } => {
+                let range = span.to_range().map_or(0..0, |r| place(r).range);
+                Diagnostic::error(format!("the name `{original}` cannot be shared between files"), Span::new(file, range))
+                    .help("names of members and items in shaders/common must not end in a digit or be reserved words: rename it")
+            }
+            ComposerErrorInner::DecorationInSource(range) => Diagnostic::error("this name is reserved by the composer", Span::new(file, range.clone())),
+            ComposerErrorInner::NotEnoughEndIfs(p)
+            | ComposerErrorInner::TooManyEndIfs(p)
+            | ComposerErrorInner::ElseWithoutCondition(p)
+            | ComposerErrorInner::DefineInModule(p)
+            | ComposerErrorInner::UnknownShaderDef { pos: p, .. }
+            | ComposerErrorInner::UnknownShaderDefOperator { pos: p, .. }
+            | ComposerErrorInner::OverrideNotVirtual { pos: p, .. }
+            | ComposerErrorInner::InvalidShaderDefComparisonValue { pos: p, .. }
+            | ComposerErrorInner::InvalidShaderDefDefinitionValue { pos: p, .. } => {
+                Diagnostic::error(self.undecorate(&error.inner.to_string()), at(*p))
+            }
+            ComposerErrorInner::InvalidWgslDirective { position: line, .. } => {
+                let start = file.text.lines().take(*line).map(|l| l.len() + 1).sum();
+                Diagnostic::error(error.inner.to_string(), Span::new(file, start..start))
+            }
+            other => Diagnostic::error(self.undecorate(&other.to_string()), Span::new(file, 0..0)),
+        }
+    }
+
+    fn labelled(&self, message: String, labels: Vec<(Range<usize>, String)>, place: &dyn Fn(Range<usize>) -> Span, file: &Arc<Source>) -> Diagnostic {
+        let mut labels = labels.into_iter();
+        match labels.next() {
+            None => Diagnostic::error(message, Span::new(file, 0..0)),
+            Some((range, text)) => {
+                let first = Diagnostic::error(message, place(range)).at(self.undecorate(&text));
+                labels.fold(first, |fault, (range, text)| fault.and(place(range), self.undecorate(&text)))
+            }
+        }
+    }
+
+    /// Takes naga_oil's marks out of a message.
+    fn undecorate(&self, text: &str) -> String {
+        let mut text = text.to_owned();
+        for name in self.modules.keys() {
+            let mark = Composer::decorated_name(Some(name), "");
+            if text.contains(&mark) {
+                text = text.replace(&mark, "");
+            }
+        }
+        debug_assert!(demangle(&text).len() <= text.len());
+        text
+    }
+}
+
+fn module_needs(module: &Module) -> BTreeSet<String> {
+    module.imports.clone()
+}
+
+/// An error and its causes, from the outside in.
+fn chain(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut at = error.source();
+    while let Some(cause) = at {
+        text.push_str(": ");
+        text.push_str(&cause.to_string());
+        at = cause.source();
+    }
+    text
+}
+
+/// What a file of `shaders/common/` must not have.
+fn check_common(module: &Module, out: &mut Vec<Diagnostic>) {
+    let fault = |range: &Range<usize>, message: String, help: &str| Diagnostic::error(message, Span::new(&module.source, range.clone())).help(help);
+    for (name, range) in &module.scan.attributes {
+        match name.as_str() {
+            "compute" | "vertex" | "fragment" => {
+                out.push(fault(range, "a file of shaders/common has no entry points".into(), "move it to a node's shader"));
+            }
+            "group" => out.push(fault(range, "a file of shaders/common has no bindings".into(), "pass the value to the function as an argument")),
+            _ => {}
+        }
+    }
+    for (name, range) in &module.scan.directives {
+        if name == "define_import_path" {
+            out.push(fault(range, "`#define_import_path` is not used here".into(), "remove it: the file's path is its import path"));
+        }
+    }
+    for item in module.scan.items.iter().filter(|i| i.keyword == "override") {
+        out.push(fault(
+            &item.range,
+            format!("a file of shaders/common has no overrides, and `{}` is one", item.name),
+            "pass the value to the function as an argument",
+        ));
+    }
+}

@@ -1,0 +1,357 @@
+//! Reads a node's declaration: `Node(doc, inputs, outputs, params, requires, steps)`.
+
+use std::sync::Arc;
+
+use indexmap::IndexMap;
+
+use crate::{
+    diagnostics::{Diagnostic, Source, Span},
+    expr::{self, ExprAt, RefKind},
+    format,
+    params::{check_identifier, read_params},
+    reader::{Reader, Shape, Spanned, head},
+    registry::{Direction, Expr, NodeDecl, Over, Param, Port, PortKind, Repeat, Step},
+    render::suggest,
+    tree::{Kind, Tree},
+};
+
+/// A declaration without its shader.
+pub(crate) struct Declaration {
+    pub doc: String,
+    pub ports: IndexMap<String, Port>,
+    pub params: IndexMap<String, Param>,
+    pub steps: Vec<Step>,
+    pub requires: Vec<String>,
+    pub span: Span,
+}
+
+impl Declaration {
+    pub fn into_node(self, name: &str, shader: Option<Arc<crate::shader::Shader>>) -> NodeDecl {
+        let Self { doc, ports, params, steps, requires, span } = self;
+        NodeDecl { name: name.to_owned(), doc, ports, params, steps, requires, shader, span }
+    }
+}
+
+const NODE: Shape = Shape { what: "Node", required: &["doc"], optional: &["inputs", "outputs", "params", "requires", "steps"] };
+
+/// Reads the declaration in `source`. `None` when there is nothing to go on with; faults go to `out`.
+pub(crate) fn read(source: &Arc<Source>, host: bool, out: &mut Vec<Diagnostic>) -> Option<Declaration> {
+    let (mut reader, tree) = Reader::open(source);
+    let declaration = tree.and_then(|tree| read_node(&mut reader, &tree, host));
+    let faulty = reader.out.iter().any(|d| d.severity == crate::diagnostics::Severity::Error);
+    out.append(&mut reader.out);
+    declaration.filter(|_| !faulty)
+}
+
+fn read_node(reader: &mut Reader, tree: &Tree, host: bool) -> Option<Declaration> {
+    match &tree.kind {
+        Kind::Record(Some(name), _) | Kind::Tuple(Some(name), _) if name.text == "Node" => {}
+        _ => {
+            reader.expected(tree, "`Node(…)`", "a node's declaration has the form Node(doc: …, inputs: …, outputs: …)");
+            return None;
+        }
+    }
+    let fields = reader.record(tree, &NODE)?;
+    let doc = fields.get("doc").and_then(|t| reader.text(t, "a sentence in quotes")).map(|d| d.text).unwrap_or_default();
+    let mut ports = IndexMap::new();
+    for (field, direction) in [("inputs", Direction::Input), ("outputs", Direction::Output)] {
+        if let Some(tree) = fields.get(field) {
+            read_ports(reader, tree, direction, &mut ports);
+        }
+    }
+    let params = fields.get("params").map(|t| read_params(reader, t)).unwrap_or_default();
+    for (name, param) in &params {
+        if let Some(port) = ports.get(name) {
+            let port: &Port = port;
+            reader.out.push(
+                Diagnostic::error(format!("`{name}` is both a port and a parameter"), param.span.clone())
+                    .and(port.span.clone(), "the port")
+                    .help("rename one of them: shaders are bound by name"),
+            );
+        }
+    }
+    let mut requires = Vec::new();
+    if let Some(tree) = fields.get("requires") {
+        for item in reader.list(tree, "device features") {
+            requires.extend(reader.text(item, "a device feature in quotes").map(|s| s.text));
+        }
+    }
+    let mut steps = Vec::new();
+    match fields.get("steps") {
+        Some(tree) if host => reader.error(&tree.range, "a node written in Rust has no steps", "remove `steps`"),
+        Some(tree) => {
+            let items = reader.list(tree, "steps");
+            if items.is_empty() && matches!(tree.kind, Kind::List(_)) {
+                reader.error(&tree.range, "a node without steps does nothing", "add `(entry: \"…\", over: …)`");
+            }
+            for item in items {
+                steps.extend(read_step(reader, item, &ports, &params));
+            }
+        }
+        None if host => {}
+        None => reader.error(&head(tree), "missing field `steps` in Node", "add `steps: [(entry: \"…\", over: …)]`"),
+    }
+    Some(Declaration { doc, ports, params, steps, requires, span: reader.span(&head(tree)) })
+}
+
+fn read_ports(reader: &mut Reader, tree: &Tree, direction: Direction, ports: &mut IndexMap<String, Port>) {
+    for (name, tree) in reader.map(tree, "ports") {
+        check_identifier(reader, &name, "port");
+        let Some((kind, optional, doc)) = read_port(reader, tree) else { continue };
+        if direction == Direction::Output && matches!(kind, PortKind::Uniform { .. }) {
+            reader.error(&head(tree), "a uniform cannot be an output", "write a buffer instead");
+        }
+        if let Some(first) = ports.get(&name.text) {
+            let first = first.span.clone();
+            reader.out.push(
+                Diagnostic::error(format!("`{}` is an input and an output", name.text), name.span)
+                    .and(first, "the input")
+                    .help("rename one of them: what a node updates in place is an output only"),
+            );
+            continue;
+        }
+        ports.insert(name.text, Port { direction, kind, optional, doc, span: name.span });
+    }
+}
+
+const PORT_KINDS: &[&str] = &["Texture", "Buffer", "Uniform"];
+
+fn read_port(reader: &mut Reader, tree: &Tree) -> Option<(PortKind, bool, String)> {
+    let kind_name = match &tree.kind {
+        Kind::Record(Some(n), _) | Kind::Tuple(Some(n), _) => n.text.clone(),
+        Kind::Name(n) => n.clone(),
+        _ => {
+            reader.expected(tree, "a port: Texture(…), Buffer(…) or Uniform(…)", "");
+            return None;
+        }
+    };
+    let shape = match kind_name.as_str() {
+        "Texture" => Shape { what: "Texture", required: &["doc"], optional: &["format", "array", "optional"] },
+        "Buffer" => Shape { what: "Buffer", required: &["of", "doc"], optional: &["optional"] },
+        "Uniform" => Shape { what: "Uniform", required: &["of", "doc"], optional: &["optional"] },
+        other => {
+            reader.error(&head(tree), format!("unknown kind of port `{other}`"), suggest(other, PORT_KINDS.iter().copied()));
+            return None;
+        }
+    };
+    let fields = reader.record(tree, &shape)?;
+    let doc = fields.get("doc").and_then(|t| reader.text(t, "a sentence in quotes")).map(|d| d.text).unwrap_or_default();
+    let optional = fields.get("optional").and_then(|t| reader.boolean(t)).unwrap_or(false);
+    let kind = match kind_name.as_str() {
+        "Texture" => {
+            let format = match fields.get("format") {
+                Some(tree) => Some(format::read(reader, tree)?),
+                None => None,
+            };
+            PortKind::Texture { format, array: fields.get("array").and_then(|t| reader.boolean(t)).unwrap_or(false) }
+        }
+        "Buffer" => PortKind::Buffer { of: read_type(reader, fields.get("of")?)? },
+        _ => PortKind::Uniform { of: read_type(reader, fields.get("of")?)? },
+    };
+    Some((kind, optional, doc))
+}
+
+/// A WGSL type by name; long spellings of vectors become short ones.
+pub(crate) fn read_type(reader: &mut Reader, tree: &Tree) -> Option<String> {
+    let name = reader.text(tree, "the name of a WGSL type in quotes")?;
+    Some(crate::reflect::canonical_type(&name.text))
+}
+
+const STEP: Shape = Shape { what: "a step", required: &["entry", "over"], optional: &["repeat"] };
+const DRAW: Shape = Shape { what: "Draw", required: &["vertex", "fragment", "vertices", "targets"], optional: &["depth"] };
+
+/// The names that a step may use.
+struct Names<'a> {
+    ports: &'a IndexMap<String, Port>,
+    params: &'a IndexMap<String, Param>,
+}
+
+fn read_step(reader: &mut Reader, tree: &Tree, ports: &IndexMap<String, Port>, params: &IndexMap<String, Param>) -> Option<Step> {
+    let names = Names { ports, params };
+    let name = match &tree.kind {
+        Kind::Record(name, _) | Kind::Tuple(name, _) => name.as_ref(),
+        _ => {
+            reader.expected(tree, "a step", "write `(entry: \"…\", over: …)` or `Draw(…)`");
+            return None;
+        }
+    };
+    let span = reader.span(&tree.range);
+    match name.map(|n| n.text.as_str()) {
+        None => {
+            let fields = reader.record(tree, &STEP)?;
+            let entry = fields.get("entry").and_then(|t| reader.text(t, "the name of an entry point in quotes"));
+            let over = fields.get("over").and_then(|t| read_over(reader, t, &names));
+            let repeat = match fields.get("repeat") {
+                Some(tree) => Some(read_repeat(reader, tree, &names)?),
+                None => None,
+            };
+            Some(Step::Compute { entry: entry?.text, over: over?, repeat, span })
+        }
+        Some("Draw") => {
+            let fields = reader.record(tree, &DRAW)?;
+            let vertex = fields.get("vertex").and_then(|t| reader.text(t, "the name of an entry point in quotes"));
+            let fragment = fields.get("fragment").and_then(|t| reader.text(t, "the name of an entry point in quotes"));
+            let vertices = fields.get("vertices").and_then(|t| read_expr(reader, t, &names));
+            let mut targets = Vec::new();
+            if let Some(tree) = fields.get("targets") {
+                for item in reader.list(tree, "output ports") {
+                    targets.extend(target(reader, item, &names, false));
+                }
+            }
+            let depth = match fields.get("depth") {
+                Some(tree) => Some(target(reader, tree, &names, true)?),
+                None => None,
+            };
+            Some(Step::Draw { vertex: vertex?.text, fragment: fragment?.text, vertices: vertices?, targets, depth, span })
+        }
+        Some(other) => {
+            reader.error(&head(tree), format!("unknown kind of step `{other}`"), "write `(entry: \"…\", over: …)` or `Draw(…)`");
+            None
+        }
+    }
+}
+
+/// An attachment: an output texture of known format.
+fn target(reader: &mut Reader, tree: &Tree, names: &Names<'_>, depth: bool) -> Option<String> {
+    let name = reader.text(tree, "the name of an output port in quotes")?;
+    let port = find_port(reader, &name, names)?;
+    let is_depth = match port.kind {
+        PortKind::Texture { format: Some(format), .. } if port.direction == Direction::Output => {
+            format == crate::value::Format::Depth32Float
+        }
+        _ => {
+            let span = port.span.clone();
+            reader.out.push(
+                Diagnostic::error(format!("`{}` cannot be drawn to", name.text), name.span)
+                    .and(span, "declared here")
+                    .help("targets are output textures with a `format`"),
+            );
+            return None;
+        }
+    };
+    if is_depth != depth {
+        let span = port.span.clone();
+        let help = if depth { "the depth attachment has the format Depth32Float" } else { "name it as `depth: …` instead" };
+        let what = if depth { "depth attachment" } else { "colour target" };
+        reader.out.push(Diagnostic::error(format!("`{}` cannot be a {what}", name.text), name.span).and(span, "declared here").help(help));
+        return None;
+    }
+    Some(name.text)
+}
+
+fn find_port<'a>(reader: &mut Reader, name: &Spanned, names: &Names<'a>) -> Option<&'a Port> {
+    let port = names.ports.get(&name.text);
+    if port.is_none() {
+        reader.out.push(
+            Diagnostic::error(format!("this node has no port `{}`", name.text), name.span.clone())
+                .help(suggest(&name.text, names.ports.keys().map(String::as_str))),
+        );
+    }
+    port
+}
+
+fn port_of_kind(reader: &mut Reader, name: &Spanned, names: &Names<'_>, texture: bool) -> Option<String> {
+    let port = find_port(reader, name, names)?;
+    if matches!(port.kind, PortKind::Texture { .. }) == texture && !matches!(port.kind, PortKind::Uniform { .. }) {
+        return Some(name.text.clone());
+    }
+    let span = port.span.clone();
+    let (wanted, help) = if texture {
+        ("texture", "`Texels`, `Width` and `Height` name textures; use `Elements` for buffers")
+    } else {
+        ("buffer", "`Elements` names buffers; use `Texels`, `Width` and `Height` for textures")
+    };
+    reader.out.push(Diagnostic::error(format!("`{}` is no {wanted}", name.text), name.span.clone()).and(span, "declared here").help(help));
+    None
+}
+
+fn read_expr(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Expr> {
+    let ExprAt { expr, refs, .. } = expr::read(reader, tree)?;
+    let mut good = true;
+    for r in &refs {
+        good &= match r.kind {
+            RefKind::Texture => port_of_kind(reader, &r.name, names, true).is_some(),
+            RefKind::Buffer => port_of_kind(reader, &r.name, names, false).is_some(),
+            RefKind::Param => match names.params.get(&r.name.text) {
+                Some(Param { kind: crate::value::ParamKind::Int { .. }, .. }) => true,
+                Some(param) => {
+                    reader.out.push(
+                        Diagnostic::error(format!("parameter `{}` is no Int", r.name.text), r.name.span.clone())
+                            .and(param.span.clone(), "declared here")
+                            .help("sizes and counts are computed from whole numbers"),
+                    );
+                    false
+                }
+                None => {
+                    reader.out.push(
+                        Diagnostic::error(format!("this node has no parameter `{}`", r.name.text), r.name.span.clone())
+                            .help(suggest(&r.name.text, names.params.keys().map(String::as_str))),
+                    );
+                    false
+                }
+            },
+        };
+    }
+    good.then_some(expr)
+}
+
+fn read_over(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Over> {
+    const FORMS: [&str; 4] = ["Texels", "Elements", "Threads", "Groups"];
+    let Kind::Tuple(Some(name), items) = &tree.kind else {
+        reader.expected(tree, "Texels(\"port\"), Elements(\"port\"), Threads(x, y, z) or Groups(x, y, z)", "");
+        return None;
+    };
+    match (name.text.as_str(), items.as_slice()) {
+        (form @ ("Texels" | "Elements"), [item]) => {
+            let port = reader.text(item, "the name of a port in quotes")?;
+            let port = port_of_kind(reader, &port, names, form == "Texels")?;
+            Some(if form == "Texels" { Over::Texels(port) } else { Over::Elements(port) })
+        }
+        (form @ ("Threads" | "Groups"), [x, y, z]) => {
+            let (x, y, z) = (read_expr(reader, x, names), read_expr(reader, y, names), read_expr(reader, z, names));
+            Some(if form == "Threads" { Over::Threads(x?, y?, z?) } else { Over::Groups(x?, y?, z?) })
+        }
+        (form, _) if FORMS.contains(&form) => {
+            let usage = if matches!(form, "Texels" | "Elements") { format!("write `{form}(\"port\")`") } else { format!("write `{form}(x, y, z)`") };
+            reader.error(&tree.range, format!("`{form}` is not used like this"), usage);
+            None
+        }
+        (form, _) => {
+            reader.error(&name.range, format!("unknown size `{form}`"), suggest(form, FORMS));
+            None
+        }
+    }
+}
+
+fn read_repeat(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Repeat> {
+    const FORMS: [&str; 3] = ["Down", "Up", "Times"];
+    let Kind::Tuple(Some(name), items) = &tree.kind else {
+        reader.expected(tree, "Down(\"port\"), Up(\"port\") or Times(n)", "");
+        return None;
+    };
+    match (name.text.as_str(), items.as_slice()) {
+        (form @ ("Down" | "Up"), [item]) => {
+            let name = reader.text(item, "the name of an output port in quotes")?;
+            let port = find_port(reader, &name, names)?;
+            if port.direction != Direction::Output || !matches!(port.kind, PortKind::Texture { .. }) {
+                let span = port.span.clone();
+                reader.out.push(
+                    Diagnostic::error(format!("`{form}` needs an output texture, and `{}` is none", name.text), name.span)
+                        .and(span, "declared here")
+                        .help("name the texture whose mip levels the step writes"),
+                );
+                return None;
+            }
+            Some(if form == "Down" { Repeat::Down(name.text) } else { Repeat::Up(name.text) })
+        }
+        ("Times", [count]) => Some(Repeat::Times(read_expr(reader, count, names)?)),
+        (form, _) if FORMS.contains(&form) => {
+            reader.error(&tree.range, format!("`{form}` takes one thing"), "write Down(\"port\"), Up(\"port\") or Times(n)");
+            None
+        }
+        (form, _) => {
+            reader.error(&name.range, format!("unknown repetition `{form}`"), suggest(form, FORMS));
+            None
+        }
+    }
+}

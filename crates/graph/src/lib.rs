@@ -1,0 +1,21 @@
+//! manylight-graph
+pub mod bind;
+mod compose;
+pub mod condition;
+mod declaration;
+pub mod diagnostics;
+pub mod expr;
+pub mod features;
+mod format;
+pub mod library;
+mod load;
+pub mod params;
+pub mod plan;
+pub mod reader;
+mod reflect;
+pub mod registry;
+pub mod render;
+pub mod shader;
+mod tree;
+pub mod value;
+mod wgsl;

@@ -1,0 +1,159 @@
+//! A pipeline as its documents say it, with `extends` and `include` carried out and the place of everything.
+
+use std::sync::Arc;
+
+use indexmap::IndexMap;
+
+use crate::{
+    condition::Condition,
+    diagnostics::{Source, Span},
+    expr::ExprAt,
+    params::Literal,
+    reader::Spanned,
+    registry::Param,
+    value::{Encoding, Format},
+};
+
+/// A pipeline, read and merged, but not yet checked against the registry.
+#[derive(Debug, Clone)]
+pub struct Pipeline {
+    /// File stem (`acrsm`).
+    pub name: String,
+    /// What it does.
+    pub doc: String,
+    /// Parameters in document order.
+    pub params: IndexMap<String, Param>,
+    /// Preset values by `parameter` or `node.parameter`.
+    pub set: IndexMap<String, Preset>,
+    /// Resources in document order.
+    pub resources: IndexMap<String, Resource>,
+    /// Nodes in document order, by id.
+    pub nodes: IndexMap<String, NodeUse>,
+    /// The resource to show.
+    pub presents: Spanned,
+    /// The resource with linear radiance.
+    pub radiance: Option<Spanned>,
+    /// Every file read, the pipeline's own first.
+    pub sources: Vec<Arc<Source>>,
+}
+
+/// A value given in `set`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Preset {
+    /// The value.
+    pub value: Literal,
+    /// Where the name stands.
+    pub name_span: Span,
+    /// Where the value stands.
+    pub span: Span,
+}
+
+/// A texture or buffer that nodes write and read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resource {
+    /// What it is.
+    pub kind: ResourceKind,
+    /// Kept for the next frame.
+    pub history: bool,
+    /// What it holds.
+    pub doc: String,
+    /// Where its name stands.
+    pub span: Span,
+}
+
+/// Format and size of a resource.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ResourceKind {
+    /// A 2D texture.
+    Texture {
+        /// Texel format.
+        format: Format,
+        /// Size of mip level 0.
+        size: Size,
+        /// Number of mip levels.
+        mips: Mips,
+        /// Meaning of the texels.
+        encoding: Encoding,
+    },
+    /// A storage buffer.
+    Buffer {
+        /// WGSL type of an element.
+        of: String,
+        /// Number of elements.
+        count: ExprAt,
+    },
+}
+
+/// The size of a texture.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Size {
+    /// The picture's.
+    Output,
+    /// The picture's times a fraction, rounded up.
+    OutputScaled(u32, u32),
+    /// Width and height.
+    Exact(Box<ExprAt>, Box<ExprAt>),
+    /// Another texture's.
+    Like(Spanned),
+}
+
+/// The mip levels of a texture.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Mips {
+    /// Only level 0.
+    One,
+    /// Down to 1×1.
+    Full,
+    /// That many.
+    Count(Box<ExprAt>),
+}
+
+/// A node of the pipeline.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodeUse {
+    /// Its id, unique in the pipeline.
+    pub id: Spanned,
+    /// Its name in the registry.
+    pub node: Spanned,
+    /// Connections of inputs by port.
+    pub inputs: IndexMap<String, Connection>,
+    /// Connections of outputs by port.
+    pub outputs: IndexMap<String, Connection>,
+    /// Parameters by name.
+    pub params: IndexMap<String, Argument>,
+    /// When it runs; always, if absent.
+    pub when: Option<Condition>,
+    /// File stem of the document that declares it.
+    pub stage: String,
+}
+
+/// A port and the resource at it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Connection {
+    /// The resource or external.
+    pub resource: Spanned,
+    /// The last frame's value.
+    pub previous: bool,
+    /// Where the port's name stands.
+    pub port_span: Span,
+}
+
+/// The value of a node's parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Argument {
+    /// The value or the pipeline's parameter.
+    pub value: ArgumentValue,
+    /// Where the parameter's name stands.
+    pub name_span: Span,
+    /// Where the value stands.
+    pub span: Span,
+}
+
+/// Where the value of a node's parameter comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ArgumentValue {
+    /// Written in the document.
+    Literal(Literal),
+    /// A parameter of the pipeline.
+    Param(String),
+}

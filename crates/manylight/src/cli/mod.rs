@@ -1,0 +1,334 @@
+//! The command line: subcommands, options and their help.
+
+pub mod values;
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Many-light global illumination from render graphs written in RON.
+#[derive(Debug, Parser)]
+#[command(name = "manylight", version, about, after_help = EXIT_CODES, subcommand_required = true, arg_required_else_help = true)]
+pub struct Cli {
+    /// Folder with `shaders/` and `pipelines/` to use instead of those built in; by default the nearest one at or above
+    /// the current folder. The environment variable MANYLIGHT_ROOT says the same
+    #[arg(long, global = true, value_name = "DIR")]
+    pub root: Option<PathBuf>,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 done, 1 the input is at fault, 2 usage, 3 no usable GPU.\n\
+    Example: manylight render acrsm --scene cornell --out picture.png";
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene with a pipeline and write pictures
+    Render(RenderArgs),
+    /// Check pipelines, nodes and scenes without a GPU
+    Check(CheckArgs),
+    /// List the nodes that pipelines can use, or describe one
+    Nodes(NodesArgs),
+    /// Draw a pipeline as a graph
+    Graph(GraphArgs),
+    /// Say which nodes will run, which not, and why
+    Explain(ExplainArgs),
+    /// Measure what each node costs
+    Profile(ProfileArgs),
+    /// Render again whenever a shader, pipeline or scene file changes
+    Watch(WatchArgs),
+    /// Measure how far an image is from a reference
+    Compare(CompareArgs),
+    /// List the adapters (GPUs and software) of this machine
+    Adapters(AdaptersArgs),
+}
+
+/// A pipeline with its parameters.
+#[derive(Debug, Args)]
+pub struct PipelineArgs {
+    /// A pipeline: a path to a .ron file, or a name such as `acrsm`
+    #[arg(value_name = "PIPELINE")]
+    pub pipeline: String,
+    /// Set a parameter of the pipeline, or of a node as `NODE.PARAMETER` (repeatable; the last one wins)
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = values::assignment)]
+    pub set: Vec<(String, String)>,
+}
+
+/// Size of the picture.
+#[derive(Debug, Args)]
+pub struct SizeArgs {
+    /// Size of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = values::size)]
+    pub size: (u32, u32),
+}
+
+/// Debug switches of the executor; none changes the picture.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Debug switches (none may change the picture)")]
+pub struct DebugArgs {
+    /// Run nodes that nobody reads
+    #[arg(long)]
+    pub no_culling: bool,
+    /// Give every resource memory of its own
+    #[arg(long)]
+    pub no_reuse: bool,
+    /// Fill transient resources with NaN patterns before their first use
+    #[arg(long)]
+    pub poison: bool,
+    /// Run the nodes in another legal order, chosen by a seed
+    #[arg(long, value_name = "SEED")]
+    pub shuffle: Option<u64>,
+}
+
+/// What to render with and how.
+#[derive(Debug, Args)]
+pub struct FrameArgs {
+    /// A scene: a path to a .ron or .obj file, or a name such as `cornell`
+    #[arg(long, value_name = "SCENE")]
+    pub scene: String,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub size: SizeArgs,
+    /// Scene time in seconds
+    #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = values::seconds, allow_negative_numbers = true)]
+    pub time: f64,
+    /// Step the scene time by 1/F from frame to frame, starting at --time; without it the time stands still
+    #[arg(long, value_name = "F", value_parser = values::rate)]
+    pub fps: Option<f64>,
+    /// Seed of everything random
+    #[arg(long, default_value_t = 0)]
+    pub seed: u32,
+    /// Use the adapter whose name contains this (see `manylight adapters`)
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub debug: DebugArgs,
+}
+
+/// `manylight render`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    manylight render acrsm --scene cornell --out picture.png\n  \
+    manylight render pipelines/acrsm.ron --scene assets/cornell.ron --set lights=vpl --set clusters=128 \\\n      \
+    --size 256x256 --out linear.exr --dump clusters=clusters.json --dump ism=ism.png --stats stats.json")]
+pub struct RenderArgs {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub pipeline: PipelineArgs,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub frame: FrameArgs,
+    /// Frames to render; the last is written. Iterative clustering needs some to settle
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub frames: u32,
+    /// Write the last frame: .png as presented, .exr as linear radiance before tone mapping (repeatable)
+    #[arg(long, value_name = "FILE")]
+    pub out: Vec<PathBuf>,
+    /// Write a resource of the graph: textures as .exr or .png (one channel: scaled to its range), buffers as .json (repeatable)
+    #[arg(long, value_name = "RESOURCE=FILE", value_parser = values::dump)]
+    pub dump: Vec<(String, PathBuf)>,
+    /// Write adapter, timings, memory, plan, parameters and sums of the dumped resources as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub stats: Option<PathBuf>,
+}
+
+/// `manylight check`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  manylight check\n  manylight check pipelines/acrsm.ron shaders/ism/splat.ron scenes/room.ron")]
+pub struct CheckArgs {
+    /// Pipelines, node declarations, scenes or sweeps (.ron); without any: everything in the library
+    #[arg(value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+}
+
+/// Output of lists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[allow(missing_docs)]
+pub enum TextOrJson {
+    Text,
+    Json,
+}
+
+/// Output of `nodes`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[allow(missing_docs)]
+pub enum NodesFormat {
+    Text,
+    Json,
+    Markdown,
+}
+
+/// `manylight nodes`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  manylight nodes\n  manylight nodes ism/splat --format markdown")]
+pub struct NodesArgs {
+    /// Only this node, in full
+    pub name: Option<String>,
+    /// How to print
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: NodesFormat,
+}
+
+/// Output of `graph`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[allow(missing_docs)]
+pub enum GraphFormat {
+    Svg,
+    Dot,
+    Mermaid,
+    Json,
+}
+
+/// `manylight graph`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manylight graph acrsm --set visibility=pcss --format svg > acrsm.svg")]
+pub struct GraphArgs {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub pipeline: PipelineArgs,
+    /// A scene, whose features conditions may test; without one a scene without textures or motion is assumed
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub size: SizeArgs,
+    /// How to draw
+    #[arg(long, value_enum, default_value = "svg")]
+    pub format: GraphFormat,
+    /// Write to a file instead of the standard output
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// `manylight explain`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manylight explain acrsm --scene cornell --set visibility=none")]
+pub struct ExplainArgs {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub pipeline: PipelineArgs,
+    /// A scene: a path to a .ron or .obj file, or a name such as `cornell`
+    #[arg(long, value_name = "SCENE")]
+    pub scene: String,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub size: SizeArgs,
+    /// How to print
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
+}
+
+/// `manylight profile`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manylight profile acrsm --scene cornell --size 256x256 --frames 32 --trace trace.json\n\
+    The trace opens in https://ui.perfetto.dev. Times of a software adapter are labelled as such.")]
+pub struct ProfileArgs {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub pipeline: PipelineArgs,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub frame: FrameArgs,
+    /// Frames to measure
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub frames: u32,
+    /// Frames to render first that are not measured
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub warm_up: u32,
+    /// Write a Chrome trace of the measured frames
+    #[arg(long, value_name = "FILE.json")]
+    pub trace: Option<PathBuf>,
+    /// How to print
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
+}
+
+/// `manylight watch`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manylight watch acrsm --scene cornell --out picture.png\nEdit a file under shaders/ or pipelines/ and save it. Ctrl+C ends.")]
+pub struct WatchArgs {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub pipeline: PipelineArgs,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub frame: FrameArgs,
+    /// Frames to render after each change before the picture is written
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub frames: u32,
+    /// Picture to write: .png as presented, .exr as linear radiance (repeatable)
+    #[arg(long, value_name = "FILE", required = true)]
+    pub out: Vec<PathBuf>,
+    /// End after this many pictures instead of running until Ctrl+C (for scripts)
+    #[arg(long, value_name = "N")]
+    pub pictures: Option<u32>,
+}
+
+/// `manylight compare`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  manylight compare picture.exr reference.exr\n  \
+    manylight compare normal.exr gbuffer.exr --reference-layer normal --format json")]
+pub struct CompareArgs {
+    /// The image: .exr (linear values) or .png (display values)
+    pub image: PathBuf,
+    /// The reference, of the same size and kind
+    pub reference: PathBuf,
+    /// Layer of the image: `albedo` for the channels albedo.R, albedo.G, albedo.B
+    #[arg(long, value_name = "NAME")]
+    pub layer: Option<String>,
+    /// Layer of the reference
+    #[arg(long, value_name = "NAME")]
+    pub reference_layer: Option<String>,
+    /// How to print
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
+}
+
+/// `manylight adapters`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  manylight adapters --format json")]
+pub struct AdaptersArgs {
+    /// How to print
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: TextOrJson,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_definition_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_subcommand_has_an_example() {
+        for command in Cli::command().get_subcommands() {
+            let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+            assert!(help.contains("Example") && help.contains(&format!("manylight {}", command.get_name())), "{}", command.get_name());
+        }
+    }
+
+    #[test]
+    fn malformed_values_are_faults_of_usage() {
+        for wrong in [
+            &["--size", "0x0"][..],
+            &["--size", "99999x1"],
+            &["--set", "clusters"],
+            &["--frames", "0"],
+            &["--fps", "0"],
+            &["--time", "soon"],
+            &["--dump", "ism"],
+            &["--shuffle", "-1"],
+        ] {
+            let line = ["manylight", "render", "acrsm", "--scene", "cornell"].iter().chain(wrong);
+            let error = Cli::try_parse_from(line).expect_err("malformed");
+            assert_eq!(error.exit_code(), 2, "{wrong:?}");
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! Values of options: `NAME=VALUE`, `WxH`, `RESOURCE=FILE`. A fault here is a fault of usage (exit code 2).
+
+use std::path::PathBuf;
+
+/// The largest side of a picture: the largest texture that WebGPU adapters of today hold.
+pub const MAX_SIDE: u32 = 16384;
+
+/// `--set NAME=VALUE`.
+pub fn assignment(text: &str) -> Result<(String, String), String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, for example `clusters=128`")?;
+    let (name, value) = (name.trim(), value.trim());
+    if name.is_empty() {
+        return Err("there is no name before `=`: expected NAME=VALUE, for example `clusters=128`".to_owned());
+    }
+    if value.is_empty() {
+        return Err(format!("there is no value after `{name}=`: expected NAME=VALUE, for example `clusters=128`"));
+    }
+    Ok((name.to_owned(), value.to_owned()))
+}
+
+/// `--size WxH`.
+pub fn size(text: &str) -> Result<(u32, u32), String> {
+    let expected = "expected WIDTHxHEIGHT in pixels, for example `640x360`";
+    let (width, height) = text.split_once(['x', 'X', '×']).ok_or(expected)?;
+    let side = |text: &str| text.trim().parse::<u64>().map_err(|_| expected.to_owned());
+    let (width, height) = (side(width)?, side(height)?);
+    let range = 1..=u64::from(MAX_SIDE);
+    if !range.contains(&width) || !range.contains(&height) {
+        return Err(format!("width and height lie between 1 and {MAX_SIDE}"));
+    }
+    Ok((width as u32, height as u32))
+}
+
+/// `--dump RESOURCE=FILE`.
+pub fn dump(text: &str) -> Result<(String, PathBuf), String> {
+    let expected = "expected RESOURCE=FILE, for example `clusters=clusters.json` or `ism=ism.exr`";
+    let (resource, file) = text.split_once('=').ok_or(expected)?;
+    if resource.trim().is_empty() || file.is_empty() {
+        return Err(expected.to_owned());
+    }
+    Ok((resource.trim().to_owned(), PathBuf::from(file)))
+}
+
+/// A finite number of seconds.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("expected a number of seconds, for example `1.5`".to_owned()),
+    }
+}
+
+/// Frames a second, above zero.
+pub fn rate(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("expected frames a second, above 0, for example `30`".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes() {
+        assert_eq!(size("640x360"), Ok((640, 360)));
+        assert_eq!(size("16384X1"), Ok((16384, 1)));
+        for wrong in ["0x0", "0x1", "1x0", "16385x1", "1x99999999999999999999999", "-1x1", "640", "x", "axb", "", "1x2x3", "1.5x2"] {
+            assert!(size(wrong).is_err(), "{wrong}");
+        }
+        assert!(size("0x0").expect_err("empty picture").contains("between 1 and 16384"));
+    }
+
+    #[test]
+    fn assignments() {
+        assert_eq!(assignment("clusters=128"), Ok(("clusters".into(), "128".into())));
+        assert_eq!(assignment("map.window = 64"), Ok(("map.window".into(), "64".into())));
+        for wrong in ["clusters", "=1", "clusters=", " = ", ""] {
+            assert!(assignment(wrong).expect_err("malformed").contains("NAME=VALUE"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn dumps() {
+        assert_eq!(dump("ism=a=b.exr"), Ok(("ism".into(), "a=b.exr".into())));
+        for wrong in ["ism", "=x.exr", "ism="] {
+            assert!(dump(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn times() {
+        assert_eq!(seconds("-1.5"), Ok(-1.5));
+        assert!(seconds("NaN").is_err() && seconds("inf").is_err() && seconds("soon").is_err());
+        assert!(rate("0").is_err() && rate("-30").is_err() && rate("30").is_ok());
+    }
+}

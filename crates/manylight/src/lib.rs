@@ -1,0 +1,4 @@
+//! manylight
+pub mod fault;
+pub mod files;
+pub mod metrics;

@@ -1,0 +1,7 @@
+//! The command line `manylight`.
+#![allow(dead_code)]
+
+mod cli;
+mod commands;
+mod progress;
+fn main() {}

@@ -1,0 +1,230 @@
+//! Scene and frame data as pipelines see them: what the externals are, how large, and how they get onto the GPU.
+
+use std::collections::BTreeMap;
+
+use bytemuck::{bytes_of, cast_slice};
+use manylight_gpu::{Externals, Fault, Gpu, TextureArray};
+use manylight_graph::{
+    registry::{External, PortKind},
+    shader::Layout,
+    value::{Encoding, Format, ResourceDesc},
+};
+use manylight_scene::{
+    Scene, SceneState,
+    gpu_data::{self, Frame, SceneInfo, SpotLight, View},
+};
+
+/// The scene's texture array.
+const TEXTURES: &str = "scene_textures";
+
+/// What an external holds and what it is for.
+struct Entry {
+    name: &'static str,
+    element: &'static str,
+    uniform: bool,
+    doc: &'static str,
+}
+
+const ENTRIES: &[Entry] = &[
+    uniform("frame", "Frame", "number of the frame, seed, scene time"),
+    uniform("scene_camera", "View", "the camera"),
+    uniform("scene_light", "SpotLight", "the first spot light, world space, W/sr; dark if the scene has none"),
+    uniform("scene_light_view", "View", "the cone of the first spot light as a square camera: full field of view = 2 × cut-off"),
+    uniform("scene_info", "SceneInfo", "bounds, areas and counts of the scene at this time"),
+    buffer("scene_vertices", "Vertex", "vertices of all meshes, object space"),
+    buffer("scene_triangles", "Triangle", "triangles of all objects"),
+    buffer("scene_objects", "Object", "transforms of all objects at this time"),
+    buffer("scene_materials", "Material", "linear albedo, specular colour and exponent, texture of all materials"),
+];
+
+const fn uniform(name: &'static str, element: &'static str, doc: &'static str) -> Entry {
+    Entry { name, element, uniform: true, doc }
+}
+
+const fn buffer(name: &'static str, element: &'static str, doc: &'static str) -> Entry {
+    Entry { name, element, uniform: false, doc }
+}
+
+/// Every external that this crate provides, for the registry: name, kind, documentation and the layout that Rust fills.
+pub fn declarations() -> Vec<External> {
+    let layouts: BTreeMap<&str, Layout> = gpu_data::layouts().into_iter().collect();
+    let mut all: Vec<External> = ENTRIES
+        .iter()
+        .map(|e| External {
+            name: e.name.to_owned(),
+            kind: if e.uniform { PortKind::Uniform { of: e.element.to_owned() } } else { PortKind::Buffer { of: e.element.to_owned() } },
+            doc: e.doc.to_owned(),
+            layout: layouts.get(e.element).cloned(),
+        })
+        .collect();
+    all.push(External {
+        name: TEXTURES.to_owned(),
+        kind: PortKind::Texture { format: Some(Format::Rgba8UnormSrgb), array: true },
+        doc: "textures of the materials, one a layer, all of one size; one white texel if there are none".to_owned(),
+        layout: None,
+    });
+    all
+}
+
+/// Sizes of the externals for a scene, as a plan needs them; no GPU is asked.
+pub fn descriptions(scene: &Scene) -> BTreeMap<String, ResourceDesc> {
+    let count = |name: &str| match name {
+        "scene_vertices" => scene.meshes.iter().map(|m| m.vertices.len()).sum(),
+        "scene_triangles" => scene.triangle_count(),
+        "scene_objects" => scene.objects.len(),
+        _ => scene.materials.len(),
+    };
+    let describe = |e: &Entry| {
+        let (element, size) = (e.element.to_owned(), size_of_element(e.element));
+        if e.uniform {
+            ResourceDesc::Uniform { element, size }
+        } else {
+            ResourceDesc::Buffer { element, stride: size, count: count(e.name).max(1) as u64 }
+        }
+    };
+    let mut all: BTreeMap<_, _> = ENTRIES.iter().map(|e| (e.name.to_owned(), describe(e))).collect();
+    let textures = &scene.textures;
+    all.insert(
+        TEXTURES.to_owned(),
+        ResourceDesc::Texture {
+            format: Format::Rgba8UnormSrgb,
+            width: textures.width,
+            height: textures.height,
+            layers: textures.layers(),
+            array: true,
+            mips: textures.levels.len() as u32,
+            encoding: Encoding::Plain,
+        },
+    );
+    all
+}
+
+fn size_of_element(element: &str) -> u32 {
+    let size = match element {
+        "Frame" => size_of::<Frame>(),
+        "View" => size_of::<View>(),
+        "SpotLight" => size_of::<SpotLight>(),
+        "SceneInfo" => size_of::<SceneInfo>(),
+        "Vertex" => size_of::<gpu_data::Vertex>(),
+        "Triangle" => size_of::<gpu_data::Triangle>(),
+        "Object" => size_of::<gpu_data::Object>(),
+        _ => size_of::<gpu_data::Material>(),
+    };
+    size as u32
+}
+
+/// Puts a scene onto the GPU: static data once, the rest when it differs from what is there.
+#[derive(Debug, Default)]
+pub struct SceneUpload {
+    /// Hash of the scene whose static data are on the GPU.
+    scene: Option<u64>,
+    /// Bytes on the GPU of what may change from frame to frame.
+    known: BTreeMap<&'static str, Vec<u8>>,
+}
+
+impl SceneUpload {
+    /// Nothing uploaded yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Makes the externals hold the scene at one time, for a picture of width / height = `aspect`.
+    ///
+    /// # Errors
+    /// A buffer or texture of the scene is larger than the device allows.
+    pub fn upload(
+        &mut self,
+        gpu: &Gpu,
+        externals: &mut Externals,
+        scene: &Scene,
+        state: &SceneState,
+        frame: &Frame,
+        aspect: f32,
+    ) -> Result<(), Fault> {
+        if self.scene != Some(scene.hash) {
+            upload_static(gpu, externals, scene)?;
+            self.scene = Some(scene.hash);
+        }
+        let parts: [(&'static str, &[u8]); 6] = [
+            ("frame", bytes_of(frame)),
+            ("scene_camera", bytes_of(&state.camera_view(aspect))),
+            ("scene_light", bytes_of(&state.light())),
+            ("scene_light_view", bytes_of(&state.light_view())),
+            ("scene_info", bytes_of(&state.info)),
+            ("scene_objects", cast_slice(&state.objects)),
+        ];
+        for (name, bytes) in parts {
+            self.set(gpu, externals, name, bytes)?;
+        }
+        Ok(())
+    }
+
+    fn set(&mut self, gpu: &Gpu, externals: &mut Externals, name: &'static str, bytes: &[u8]) -> Result<(), Fault> {
+        if self.known.get(name).is_some_and(|known| known == bytes) {
+            return Ok(());
+        }
+        let Some(entry) = ENTRIES.iter().find(|e| e.name == name) else { return Ok(()) };
+        if entry.uniform {
+            externals.set_uniform(gpu, name, entry.element, bytes)?;
+        } else {
+            externals.set_buffer(gpu, name, entry.element, size_of_element(entry.element), bytes)?;
+        }
+        let known = self.known.entry(name).or_default();
+        known.clear();
+        known.extend_from_slice(bytes);
+        Ok(())
+    }
+}
+
+fn upload_static(gpu: &Gpu, externals: &mut Externals, scene: &Scene) -> Result<(), Fault> {
+    let mut set = |name: &str, element: &str, bytes: &[u8]| externals.set_buffer(gpu, name, element, size_of_element(element), bytes);
+    set("scene_vertices", "Vertex", cast_slice(&scene.gpu_vertices()))?;
+    set("scene_triangles", "Triangle", cast_slice(&scene.gpu_triangles()))?;
+    set("scene_materials", "Material", cast_slice(&scene.gpu_materials()))?;
+    let layers = texture_layers(scene);
+    let layers: Vec<&[u8]> = layers.iter().map(Vec::as_slice).collect();
+    let textures = &scene.textures;
+    externals.set_texture_array(
+        gpu,
+        TEXTURES,
+        TextureArray {
+            format: Format::Rgba8UnormSrgb,
+            width: textures.width,
+            height: textures.height,
+            mips: textures.levels.len() as u32,
+            layers: &layers,
+        },
+    )
+}
+
+/// The texels layer by layer with all levels of each; the scene has them level by level with all layers of each.
+fn texture_layers(scene: &Scene) -> Vec<Vec<u8>> {
+    let textures = &scene.textures;
+    let count = textures.layers() as usize;
+    let of_layer = |layer: usize| {
+        textures.levels.iter().flat_map(move |level| {
+            let size = level.len() / count;
+            level[layer * size..(layer + 1) * size].iter().copied()
+        })
+    };
+    (0..count).map(|layer| of_layer(layer).collect()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_external_of_a_structure_has_its_layout_and_size() {
+        for external in declarations() {
+            match &external.kind {
+                PortKind::Buffer { of } | PortKind::Uniform { of } => {
+                    let layout = external.layout.as_ref().expect("a layout for each structure");
+                    assert_eq!(layout.size, size_of_element(of), "{of}");
+                }
+                PortKind::Texture { .. } => assert!(external.layout.is_none()),
+            }
+            assert!(!external.doc.is_empty());
+        }
+    }
+}

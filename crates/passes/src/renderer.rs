@@ -1,0 +1,340 @@
+//! [`Renderer`]: a pipeline that renders a scene, and goes on while its files change.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use manylight_gpu::{
+    BuildOptions, BuildReport, Externals, Fault, Frame, FrameTimings, Gpu, HostData, HostNodes, Image, MemoryReport, ReadError, RunError,
+    Subresource, WatchSet,
+};
+use manylight_graph::{
+    diagnostics::{Diagnostic, Diagnostics},
+    library::Library,
+    pipeline::Pipeline,
+    plan::{Debug, Plan, PlanInput},
+};
+use manylight_scene::{Scene, gpu_data};
+use thiserror::Error;
+
+use crate::{
+    documents::Documents,
+    externals::{SceneUpload, descriptions},
+    host::{self, HostScene},
+    scene_source::SceneSource,
+};
+
+/// How to render.
+#[derive(Debug, Clone, Default)]
+pub struct Settings {
+    /// Width and height of the picture in pixels.
+    pub size: (u32, u32),
+    /// Values of parameters: of the pipeline (`clusters`) or of a node (`map.window`). The last one of a name wins.
+    pub set: Vec<(String, String)>,
+    /// Resources to keep for [`Renderer::read`] besides the picture and the radiance.
+    pub keep: Vec<String>,
+    /// Debug switches; none changes the picture.
+    pub debug: Debug,
+    /// Seed of everything random.
+    pub seed: u32,
+}
+
+/// Why there is no frame.
+#[derive(Debug, Clone, Error)]
+pub enum RenderError {
+    /// Documents, shaders or parameters are at fault, or do not fit the device.
+    #[error("{0}")]
+    Documents(Diagnostics),
+    /// The frame could not be run.
+    #[error(transparent)]
+    Run(#[from] RunError),
+}
+
+impl From<Diagnostics> for RenderError {
+    fn from(diagnostics: Diagnostics) -> Self {
+        Self::Documents(diagnostics)
+    }
+}
+
+impl From<Fault> for RenderError {
+    fn from(fault: Fault) -> Self {
+        Self::Documents(Diagnostics(vec![Diagnostic::error_nowhere(fault.to_string())]))
+    }
+}
+
+/// What a change of files or parameters did.
+#[derive(Debug, Clone, Default)]
+pub struct ReloadReport {
+    /// Nodes and histories that were kept, rebuilt and reset.
+    pub build: BuildReport,
+    /// Whether another scene is rendered now.
+    pub scene_changed: bool,
+    /// Faults of nodes that the pipeline does not use, and warnings.
+    pub warnings: Diagnostics,
+    /// Time it took.
+    pub took: Duration,
+}
+
+/// A pipeline bound to a device and a scene.
+///
+/// Everything that can fail is built beside the running frame: after an error the renderer goes on as before.
+#[derive(Debug)]
+pub struct Renderer {
+    gpu: Gpu,
+    documents: Documents,
+    hosts: HostNodes,
+    settings: Settings,
+    scene: LoadedScene,
+    frame: Frame,
+    last_time: Option<f64>,
+}
+
+/// A scene with its data on the GPU.
+#[derive(Debug)]
+struct LoadedScene {
+    source: SceneSource,
+    host: HostScene,
+    upload: SceneUpload,
+    externals: Externals,
+}
+
+impl LoadedScene {
+    fn new(source: SceneSource, scene: Scene, seed: u32) -> Self {
+        Self { source, host: HostScene { scene: Arc::new(scene), seed }, upload: SceneUpload::new(), externals: Externals::new() }
+    }
+
+    fn upload(&mut self, gpu: &Gpu, size: (u32, u32), frame: &gpu_data::Frame) -> Result<(), Fault> {
+        let state = self.host.scene.sample(f64::from(frame.time));
+        let aspect = size.0 as f32 / size.1 as f32;
+        self.upload.upload(gpu, &mut self.externals, &self.host.scene, &state, frame, aspect)
+    }
+
+    /// Changes with the scene and with the seed.
+    fn stamp(&self) -> u64 {
+        self.host.scene.hash ^ u64::from(self.host.seed).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+    }
+}
+
+/// What a plan depends on besides pipeline and nodes; needs no GPU.
+pub fn plan_input(settings: &Settings, scene: &Scene) -> PlanInput {
+    PlanInput {
+        output: settings.size,
+        set: settings.set.clone(),
+        features: scene.features(),
+        externals: descriptions(scene),
+        keep: settings.keep.clone(),
+        debug: settings.debug,
+    }
+}
+
+impl Renderer {
+    /// Loads a pipeline (a path, or a name in the library) and a scene, and builds the first frame.
+    ///
+    /// # Errors
+    /// Every fault of the pipeline, of the nodes that it uses, of the scene and of the parameters; a plan that the device cannot run.
+    pub fn new(gpu: &Gpu, library: Library, pipeline: impl AsRef<Path>, scene: SceneSource, settings: Settings) -> Result<Self, RenderError> {
+        let documents = Documents::load(library, pipeline.as_ref())?;
+        let loaded = scene.load()?;
+        Self::with(gpu, documents, scene, loaded, settings)
+    }
+
+    /// As [`Renderer::new`], from what is loaded already.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn with(gpu: &Gpu, documents: Documents, source: SceneSource, scene: Scene, settings: Settings) -> Result<Self, RenderError> {
+        let hosts = host::nodes();
+        let mut scene = LoadedScene::new(source, scene, settings.seed);
+        let plan = documents.plan(&plan_input(&settings, &scene.host.scene))?;
+        scene.upload(gpu, settings.size, &gpu_data::Frame { seed: settings.seed, ..Default::default() })?;
+        let (frame, _) = build(gpu, &plan, &scene, &hosts, None, &settings)?;
+        Ok(Self { gpu: gpu.clone(), documents, hosts, settings, scene, frame, last_time: None })
+    }
+
+    /// Renders the scene at a time in seconds. Returns when the frame is submitted, not when it is done.
+    ///
+    /// # Errors
+    /// A host node failed, the scene outgrew the device, or the device is lost.
+    pub fn render_frame(&mut self, time: f64) -> Result<(), RenderError> {
+        let frame = gpu_data::Frame {
+            index: self.frame.index() as u32,
+            seed: self.settings.seed,
+            time: time as f32,
+            delta_time: self.last_time.map_or(0.0, |last| (time - last) as f32),
+        };
+        self.scene.upload(&self.gpu, self.settings.size, &frame)?;
+        let data = HostData::new(&self.scene.host, self.scene.stamp());
+        self.frame.record_and_submit(&self.gpu, &self.scene.externals, data)?;
+        self.last_time = Some(time);
+        Ok(())
+    }
+
+    /// Reads a texture of the latest frame: the picture, the radiance, a history, or one named in [`Settings::keep`]. Waits for the GPU.
+    ///
+    /// # Errors
+    /// There is no such texture in the plan.
+    pub fn read(&self, resource: &str) -> Result<Image, ReadError> {
+        self.frame.read_image(&self.gpu, &self.scene.externals, resource, Subresource::default())
+    }
+
+    /// Reads a buffer of the latest frame as JSON with the field names of its structure. Waits for the GPU.
+    ///
+    /// # Errors
+    /// There is no such buffer in the plan.
+    pub fn read_json(&self, resource: &str) -> Result<serde_json::Value, ReadError> {
+        self.frame.read_json(&self.gpu, &self.scene.externals, resource)
+    }
+
+    /// Times of the newest frame whose timestamps have arrived. Never waits.
+    pub fn timings(&self) -> Option<&FrameTimings> {
+        self.frame.timings()
+    }
+
+    /// Waits for the GPU and returns the times of the latest frame.
+    pub fn wait_timings(&mut self) -> Option<&FrameTimings> {
+        self.frame.wait_timings(&self.gpu)
+    }
+
+    /// What runs.
+    pub fn plan(&self) -> &Plan {
+        self.frame.plan()
+    }
+
+    /// The frame, for those who draw its textures elsewhere.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// The pipeline.
+    pub fn pipeline(&self) -> &Pipeline {
+        self.documents.pipeline()
+    }
+
+    /// The pipeline with its nodes.
+    pub fn documents(&self) -> &Documents {
+        &self.documents
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene.host.scene
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// How it renders.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Scene and frame data on the GPU.
+    pub fn externals(&self) -> &Externals {
+        &self.scene.externals
+    }
+
+    /// Memory of the frame by resource.
+    pub fn memory_report(&self) -> MemoryReport {
+        self.frame.memory_report()
+    }
+
+    /// What to watch: `shaders/` and `pipelines/` of the library's root, the pipeline's documents, the scene's files.
+    pub fn watch_set(&self) -> WatchSet {
+        let mut set = self.documents.watch_set();
+        set.files.extend(self.scene.host.scene.sources.iter().cloned());
+        set
+    }
+
+    /// Takes over changed files. Without any given, everything is looked at.
+    ///
+    /// # Errors
+    /// The faults; the renderer goes on with what it had.
+    pub fn reload(&mut self, changed: &[PathBuf]) -> Result<ReloadReport, Diagnostics> {
+        let start = Instant::now();
+        let of_scene = |path: &PathBuf| self.scene.host.scene.sources.iter().any(|source| same_file(source, path));
+        let documents = if changed.is_empty() || !changed.iter().all(of_scene) { Some(self.documents.reload()) } else { None };
+        let scene = if changed.is_empty() || changed.iter().any(of_scene) { Some(self.scene.source.load()) } else { None };
+        let (documents, scene) = match (documents.transpose(), scene.transpose()) {
+            (Ok(documents), Ok(scene)) => (documents, scene.filter(|s| s.hash != self.scene.host.scene.hash)),
+            (documents, scene) => {
+                let mut faults = documents.err().unwrap_or_default();
+                faults.extend(scene.err().unwrap_or_default());
+                return Err(faults);
+            }
+        };
+        let mut report = self.change(documents, scene, None)?;
+        report.took = start.elapsed();
+        Ok(report)
+    }
+
+    /// Sets a parameter of the pipeline (`clusters`) or of a node (`map.window`).
+    ///
+    /// # Errors
+    /// There is no such parameter, or the value is not one of its values; everything stays as it was.
+    pub fn set_parameter(&mut self, name: &str, value: &str) -> Result<ReloadReport, Diagnostics> {
+        let mut settings = self.settings.clone();
+        settings.set.retain(|(known, _)| known != name);
+        settings.set.push((name.to_owned(), value.to_owned()));
+        self.set(settings)
+    }
+
+    /// Changes size, parameters, kept resources or debug switches all at once.
+    ///
+    /// # Errors
+    /// The settings do not fit the pipeline or the device; everything stays as it was.
+    pub fn set(&mut self, settings: Settings) -> Result<ReloadReport, Diagnostics> {
+        let start = Instant::now();
+        let mut report = self.change(None, None, Some(settings))?;
+        report.took = start.elapsed();
+        Ok(report)
+    }
+
+    /// Plans and builds beside the running frame and swaps when all went well.
+    fn change(&mut self, documents: Option<Documents>, scene: Option<Scene>, settings: Option<Settings>) -> Result<ReloadReport, Diagnostics> {
+        let new_settings = settings.as_ref().unwrap_or(&self.settings);
+        let new_documents = documents.as_ref().unwrap_or(&self.documents);
+        let mut new_scene = scene.map(|scene| LoadedScene::new(self.scene.source.clone(), scene, new_settings.seed));
+        let described = new_scene.as_ref().map_or(&self.scene.host.scene, |s| &s.host.scene);
+        let plan = new_documents.plan(&plan_input(new_settings, described))?;
+        if let Some(scene) = &mut new_scene {
+            let frame = gpu_data::Frame { seed: new_settings.seed, time: self.last_time.unwrap_or(0.0) as f32, ..Default::default() };
+            scene.upload(&self.gpu, new_settings.size, &frame).map_err(|f| Diagnostics(vec![Diagnostic::error_nowhere(f.to_string())]))?;
+        }
+        let on_gpu = new_scene.as_ref().unwrap_or(&self.scene);
+        let (frame, build) = build(&self.gpu, &plan, on_gpu, &self.hosts, Some(&self.frame), new_settings)?;
+        self.frame = frame;
+        let scene_changed = new_scene.is_some();
+        if let Some(scene) = new_scene {
+            self.scene = scene;
+        }
+        if let Some(documents) = documents {
+            self.documents = documents;
+        }
+        if let Some(settings) = settings {
+            self.scene.host.seed = settings.seed;
+            self.settings = settings;
+        }
+        Ok(ReloadReport { build, scene_changed, warnings: self.documents.registry_faults().clone(), took: Duration::ZERO })
+    }
+}
+
+fn build(
+    gpu: &Gpu,
+    plan: &Plan,
+    scene: &LoadedScene,
+    hosts: &HostNodes,
+    previous: Option<&Frame>,
+    settings: &Settings,
+) -> Result<(Frame, BuildReport), Diagnostics> {
+    let options = BuildOptions { poison: settings.debug.poison, ..Default::default() };
+    Frame::build(gpu, plan, &scene.externals, hosts, previous, options).map_err(|e| e.diagnostics())
+}
+
+/// Whether two paths name one file, as far as that can be told (a deleted file has no canonical path).
+fn same_file(a: &Path, b: &Path) -> bool {
+    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b) || a.ends_with(b) || b.ends_with(a)
+}

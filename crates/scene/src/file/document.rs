@@ -1,0 +1,251 @@
+//! What a scene file says, with every fault in it.
+
+use glam::Vec3;
+use manylight_graph::{
+    diagnostics::Diagnostic,
+    ron::{Fields, Kind, Reader, Shape, Spanned, Tree, head, suggest},
+};
+
+use super::{
+    motion::{read_motion, warn_long_turns},
+    values::{albedo, angle, checked, intensity, point, rotation, scale, vector},
+};
+use crate::{
+    gpu_data::Falloff,
+    motion::{CameraPose, LightPose, Pose, Track},
+    scene::Light,
+};
+
+/// A scene file.
+#[derive(Default)]
+pub(super) struct Document {
+    pub(super) meshes: Vec<MeshEntry>,
+    pub(super) camera: Option<Track<CameraPose>>,
+    pub(super) lights: Option<Vec<Light>>,
+    pub(super) materials: Vec<MaterialEntry>,
+}
+
+/// An instance of a mesh.
+pub(super) struct MeshEntry {
+    pub(super) file: Spanned,
+    pub(super) name: Option<String>,
+    pub(super) pose: Track<Pose>,
+}
+
+/// Changes to the materials of a name.
+pub(super) struct MaterialEntry {
+    pub(super) name: Spanned,
+    pub(super) diffuse: Option<Vec3>,
+    pub(super) specular: Option<Vec3>,
+    pub(super) shininess: Option<f32>,
+    pub(super) texture: Option<Spanned>,
+}
+
+const SCENE: Shape = Shape { what: "a scene", required: &["meshes"], optional: &["camera", "lights", "materials"] };
+const MESH: Shape = Shape { what: "a mesh", required: &["file"], optional: &["name", "transform", "motion", "repeat"] };
+const TRANSFORM: Shape = Shape { what: "a transform", required: &[], optional: &["translate", "rotate_deg", "scale"] };
+const TRANSFORM_KEY: Shape = Shape { what: "a key frame of an object", required: &["time"], optional: TRANSFORM.optional };
+const CAMERA: Shape = Shape { what: "a camera", required: &["origin", "target"], optional: &["up", "fov_x_deg", "motion", "repeat"] };
+const CAMERA_KEY: Shape = Shape { what: "a key frame of a camera", required: &["time"], optional: &["origin", "target", "up", "fov_x_deg"] };
+const SPOT: Shape = Shape {
+    what: "a spot light",
+    required: &["position", "target", "intensity", "beam_deg", "cutoff_deg"],
+    optional: &["falloff", "motion", "repeat"],
+};
+const LIGHT_KEY: Shape = Shape { what: "a key frame of a light", required: &["time"], optional: &["position", "target", "intensity"] };
+const MATERIAL: Shape = Shape { what: "a material", required: &[], optional: &["diffuse", "specular", "shininess", "texture"] };
+
+/// Field of view of a camera that does not say.
+const DEFAULT_FOV_X_DEG: f32 = 50.0;
+
+/// Reads a document; faults go to the reader.
+pub(super) fn read(reader: &mut Reader, tree: &Tree) -> Document {
+    let mut document = Document::default();
+    if !named(reader, tree, "Scene", "a scene file is `Scene(meshes: [\"mesh.obj\"], …)`") {
+        return document;
+    }
+    let Some(fields) = reader.record(tree, &SCENE) else { return document };
+    if let Some(tree) = fields.get("meshes") {
+        let list = reader.list(tree, "meshes");
+        if list.is_empty() && matches!(tree.kind, Kind::List(_)) {
+            reader.error(&tree.range, "a scene needs a mesh", "write `meshes: [\"mesh.obj\"]`");
+        }
+        document.meshes = list.iter().filter_map(|tree| read_mesh(reader, tree)).collect();
+    }
+    document.camera = fields.get("camera").and_then(|tree| read_camera(reader, tree));
+    document.lights = fields.get("lights").map(|tree| reader.list(tree, "lights").iter().filter_map(|tree| read_light(reader, tree)).collect());
+    if let Some(tree) = fields.get("materials") {
+        let entries = reader.map(tree, "materials");
+        document.materials = entries.into_iter().filter_map(|(name, tree)| read_material(reader, name, tree)).collect();
+    }
+    document
+}
+
+/// Whether a value is of the form `NAME(…)`; if not, that is reported.
+fn named(reader: &mut Reader, tree: &Tree, wanted: &str, help: &str) -> bool {
+    match &tree.kind {
+        Kind::Record(Some(name), _) | Kind::Tuple(Some(name), _) if name.text != wanted => {
+            let known = suggest(&name.text, [wanted]);
+            let help = if known.is_empty() { help.to_owned() } else { known };
+            reader.error(&name.range, format!("expected `{wanted}(…)`, found `{}(…)`", name.text), help);
+            false
+        }
+        Kind::Record(Some(_), _) | Kind::Tuple(Some(_), _) => true,
+        _ => {
+            reader.expected(tree, &format!("`{wanted}(…)`"), help);
+            false
+        }
+    }
+}
+
+fn read_mesh(reader: &mut Reader, tree: &Tree) -> Option<MeshEntry> {
+    if let Kind::Text(_) = tree.kind {
+        return reader.text(tree, "a file").map(|file| MeshEntry { file, name: None, pose: Track::fixed(Pose::default()) });
+    }
+    if !named(reader, tree, "Mesh", "a mesh is \"mesh.obj\" or `Mesh(file: \"mesh.obj\", …)`") {
+        return None;
+    }
+    let fields = reader.record(tree, &MESH)?;
+    let name = fields.get("name").and_then(|tree| reader.text(tree, "a name")).map(|name| name.text);
+    let mut rest = Pose::default();
+    if let Some(tree) = fields.get("transform") {
+        let before = reader.out.len();
+        rest = read_pose(reader, tree, &TRANSFORM, &rest).map_or(rest, |(pose, _)| pose);
+        if reader.out.len() == before && rest.scale.to_array().contains(&0.0) {
+            reader.error(&tree.range, "the scale is zero", "an object that stands still needs a size along every axis");
+        }
+    }
+    let motion = read_motion(reader, &fields, |reader, tree| read_pose(reader, tree, &TRANSFORM_KEY, &rest));
+    if let Some(keys) = &motion {
+        warn_long_turns(reader, keys);
+    }
+    let pose = motion.and_then(|keys| keys.track(|(pose, _)| pose)).unwrap_or_else(|| Track::fixed(rest));
+    let file = fields.get("file").and_then(|tree| reader.text(tree, "a file"))?;
+    Some(MeshEntry { file, name, pose })
+}
+
+/// A pose, and its rotation as axis and angle if it is written so.
+pub(super) type WrittenPose = (Pose, Option<(Vec3, f32)>);
+
+fn read_pose(reader: &mut Reader, tree: &Tree, shape: &Shape, rest: &Pose) -> Option<WrittenPose> {
+    let fields = reader.record(tree, shape)?;
+    let mut pose = *rest;
+    let mut turn = None;
+    if let Some(translate) = fields.get("translate").and_then(|tree| point(reader, tree)) {
+        pose.translate = translate;
+    }
+    if let Some((rotate, written)) = fields.get("rotate_deg").and_then(|tree| rotation(reader, tree)) {
+        pose.rotate = rotate;
+        turn = written;
+    }
+    if let Some(scale) = fields.get("scale").and_then(|tree| scale(reader, tree)) {
+        pose.scale = scale;
+    }
+    Some((pose, turn))
+}
+
+fn read_camera(reader: &mut Reader, tree: &Tree) -> Option<Track<CameraPose>> {
+    let fields = reader.record(tree, &CAMERA)?;
+    let before = reader.out.len();
+    let none = CameraPose { origin: Vec3::ZERO, target: Vec3::NEG_Z, up: Vec3::Y, fov_x_deg: DEFAULT_FOV_X_DEG };
+    let complete = fields.get("origin").is_some() && fields.get("target").is_some();
+    let rest = read_camera_pose(reader, tree, &fields, &none, complete);
+    let motion = read_motion(reader, &fields, |reader, tree| {
+        let fields = reader.record(tree, &CAMERA_KEY)?;
+        Some(read_camera_pose(reader, tree, &fields, &rest, complete))
+    });
+    // A camera with faults is none that could be used; the faults stop the scene.
+    (reader.out.len() == before).then(|| motion.and_then(|keys| keys.track(|pose| pose)).unwrap_or_else(|| Track::fixed(rest)))
+}
+
+/// The camera of a record; what is missing is taken from `rest`.
+fn read_camera_pose(reader: &mut Reader, tree: &Tree, fields: &Fields<'_>, rest: &CameraPose, complete: bool) -> CameraPose {
+    let before = reader.out.len();
+    let read = |name: &str, reader: &mut Reader| fields.get(name).and_then(|tree| point(reader, tree));
+    let origin = read("origin", reader).unwrap_or(rest.origin);
+    let target = read("target", reader).unwrap_or(rest.target);
+    let up = fields.get("up").and_then(|tree| vector(reader, tree)).unwrap_or(rest.up);
+    let fov = fields.get("fov_x_deg").and_then(|tree| {
+        checked(reader, tree, |fov| (fov <= 0.0 || fov >= 180.0).then_some("a field of view is between 0 and 180 degrees, without these"))
+    });
+    if reader.out.len() == before && complete {
+        let forward = target.as_dvec3() - origin.as_dvec3();
+        let sine = forward.normalize_or_zero().cross(up.as_dvec3().normalize_or_zero()).length();
+        if origin == target {
+            reader.error(&head(tree), "the camera is on its target", "origin and target must differ");
+        } else if sine < 1e-6 {
+            let help = "`up` must not be along the line of sight";
+            reader.error(&fields.get("up").map_or(head(tree), |tree| tree.range.clone()), "the camera looks along `up`", help);
+        }
+    }
+    CameraPose { origin, target, up, fov_x_deg: fov.unwrap_or(rest.fov_x_deg) }
+}
+
+fn read_light(reader: &mut Reader, tree: &Tree) -> Option<Light> {
+    if !named(reader, tree, "Spot", "a light is `Spot(position: …, target: …, intensity: …, beam_deg: …, cutoff_deg: …)`") {
+        return None;
+    }
+    let fields = reader.record(tree, &SPOT)?;
+    let before = reader.out.len();
+    let complete = fields.get("position").is_some() && fields.get("target").is_some();
+    let none = LightPose { position: Vec3::ZERO, target: Vec3::NEG_Y, intensity: Vec3::ZERO };
+    let rest = read_light_pose(reader, tree, &fields, &none, complete);
+    let beam = fields.get("beam_deg").and_then(|tree| angle(reader, tree));
+    let cutoff = fields.get("cutoff_deg").and_then(|tree| angle(reader, tree).map(|angle| (angle, tree)));
+    if let (Some(beam), Some((cutoff, tree))) = (beam, cutoff)
+        && cutoff <= beam
+    {
+        reader.error(&tree.range, format!("the cut-off {cutoff}° is not above the beam {beam}°"), "both are half-angles; the light fades between them");
+    }
+    let falloff = fields.get("falloff").map_or(Some(Falloff::Linear), |tree| read_falloff(reader, tree));
+    let motion = read_motion(reader, &fields, |reader, tree| {
+        let fields = reader.record(tree, &LIGHT_KEY)?;
+        Some(read_light_pose(reader, tree, &fields, &rest, complete))
+    });
+    let pose = motion.and_then(|keys| keys.track(|pose| pose)).unwrap_or_else(|| Track::fixed(rest));
+    (reader.out.len() == before).then_some(())?;
+    Some(Light { pose, beam_deg: beam?, cutoff_deg: cutoff?.0, falloff: falloff? })
+}
+
+/// The light of a record; what is missing is taken from `rest`.
+fn read_light_pose(reader: &mut Reader, tree: &Tree, fields: &Fields<'_>, rest: &LightPose, complete: bool) -> LightPose {
+    let before = reader.out.len();
+    let position = fields.get("position").and_then(|tree| point(reader, tree)).unwrap_or(rest.position);
+    let target = fields.get("target").and_then(|tree| point(reader, tree)).unwrap_or(rest.target);
+    let intensity = fields.get("intensity").and_then(|tree| intensity(reader, tree)).unwrap_or(rest.intensity);
+    if reader.out.len() == before && complete && position == target {
+        reader.error(&head(tree), "the light is on its target", "position and target must differ: they give its direction");
+    }
+    LightPose { position, target, intensity }
+}
+
+fn read_falloff(reader: &mut Reader, tree: &Tree) -> Option<Falloff> {
+    let known = [("linear", Falloff::Linear), ("cosine", Falloff::Cosine), ("smooth", Falloff::Smooth)];
+    let names = known.map(|(name, _)| name);
+    match &tree.kind {
+        Kind::Name(name) | Kind::Text(name) => {
+            let found = known.iter().find(|(known, _)| known == name).map(|(_, falloff)| *falloff);
+            if found.is_none() {
+                reader.error(&tree.range, format!("unknown falloff `{name}`"), suggest(name, names));
+            }
+            found
+        }
+        _ => {
+            reader.expected(tree, "`linear`, `cosine` or `smooth`", "");
+            None
+        }
+    }
+}
+
+fn read_material(reader: &mut Reader, name: Spanned, tree: &Tree) -> Option<MaterialEntry> {
+    let fields = reader.record(tree, &MATERIAL)?;
+    let diffuse = fields.get("diffuse").and_then(|tree| albedo(reader, tree));
+    let specular = fields.get("specular").and_then(|tree| albedo(reader, tree));
+    let shininess = fields.get("shininess").and_then(|tree| checked(reader, tree, |n| (n < 0.0).then_some("an exponent is at least 0")));
+    let texture = fields.get("texture").and_then(|tree| reader.text(tree, "a file"));
+    if [diffuse, specular].iter().all(Option::is_none) && shininess.is_none() && texture.is_none() && matches!(&tree.kind, Kind::Tuple(..)) {
+        let span = name.span.clone();
+        reader.out.push(Diagnostic::warning(format!("nothing of `{}` is changed", name.text), span).help("give `diffuse`, `specular`, …"));
+    }
+    Some(MaterialEntry { name, diffuse, specular, shininess, texture })
+}

@@ -1,0 +1,284 @@
+//! Structures that shaders read, laid out as `shaders/common/scene.wgsl` and `shaders/common/points.wgsl` declare them.
+//!
+//! [`layouts`] describes them from Rust, so that whoever loads a shader can compare them with what reflection says of the WGSL.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Mat4, Vec3, Vec4};
+use manylight_graph::shader::{Layout, Member, MemberKind, Scalar};
+
+/// A pinhole camera, or a light seen as one. World space, right-handed; all vectors have unit length.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct View {
+    /// Reverse z without a far plane: 1 at `near`, 0 at infinity; y up.
+    pub clip_from_world: Mat4,
+    /// The eye.
+    pub origin: Vec3,
+    /// Distance of the near plane.
+    pub near: f32,
+    /// To the right of the picture.
+    pub right: Vec3,
+    /// Tangent of half the horizontal field of view.
+    pub tan_half_x: f32,
+    /// To the top of the picture.
+    pub up: Vec3,
+    /// Tangent of half the vertical field of view.
+    pub tan_half_y: f32,
+    /// Into the picture.
+    pub forward: Vec3,
+    /// A distance beyond everything in the scene.
+    pub far: f32,
+}
+
+/// How a spot light darkens between its beam and its cut-off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[repr(u32)]
+pub enum Falloff {
+    /// Linear in the angle.
+    #[default]
+    Linear = 0,
+    /// `cos θ / cos(cutoff)` up to the cut-off: brighter than 1 inside (ACRSM fig. 5.1).
+    Cosine = 1,
+    /// A smooth step in the angle.
+    Smooth = 2,
+}
+
+/// A spot light.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct SpotLight {
+    /// World space.
+    pub position: Vec3,
+    /// Half-angle of full intensity.
+    pub beam_rad: f32,
+    /// Unit vector along the axis.
+    pub direction: Vec3,
+    /// Half-angle beyond which it is dark.
+    pub cutoff_rad: f32,
+    /// W/sr.
+    pub intensity: Vec3,
+    /// A [`Falloff`].
+    pub falloff: u32,
+}
+
+/// Counters and sizes of the frame.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct Frame {
+    /// Frames since the last reset.
+    pub index: u32,
+    /// Seed of everything random.
+    pub seed: u32,
+    /// Scene time in seconds.
+    pub time: f32,
+    /// Seconds since the frame before.
+    pub delta_time: f32,
+}
+
+/// Extent and statistics of the scene in world space at one time.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct SceneInfo {
+    /// Least corner of the bounding box.
+    pub bounds_min: Vec3,
+    /// Diagonal of the bounding box.
+    pub diagonal: f32,
+    /// Greatest corner of the bounding box.
+    pub bounds_max: Vec3,
+    /// Surface of all triangles.
+    pub total_area: f32,
+    /// Area of the smallest triangle, before object transforms.
+    pub area_min: f32,
+    /// Area of the largest triangle, before object transforms.
+    pub area_max: f32,
+    /// Shortest edge, before object transforms.
+    pub edge_min: f32,
+    /// Longest edge, before object transforms.
+    pub edge_max: f32,
+    /// Triangles of all objects.
+    pub triangle_count: u32,
+    /// Objects.
+    pub object_count: u32,
+    /// Lights.
+    pub light_count: u32,
+    /// Layers of the texture array that hold textures.
+    pub texture_count: u32,
+}
+
+/// A vertex in object space.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Vertex {
+    /// Object space.
+    pub position: Vec3,
+    /// Texture coordinate to the right.
+    pub u: f32,
+    /// Shading normal of unit length; zero: use the flat normal of the triangle.
+    pub normal: Vec3,
+    /// Texture coordinate **downwards** (an OBJ's `vt` counts upwards: v = 1 − vt.y), so that (0, 0) is the first texel in memory.
+    pub v: f32,
+}
+
+/// A triangle of an object.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct Triangle {
+    /// First vertex.
+    pub a: u32,
+    /// Second vertex.
+    pub b: u32,
+    /// Third vertex.
+    pub c: u32,
+    /// Index of the [`Object`].
+    pub object: u32,
+    /// Index of the [`Material`].
+    pub material: u32,
+}
+
+/// Where an object is.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Object {
+    /// Affine.
+    pub world_from_object: Mat4,
+    /// Inverse transpose up to a positive factor; the upper left 3×3 counts.
+    pub normal_from_object: Mat4,
+}
+
+/// [`Material::diffuse_texture`] of a material without a texture.
+pub const NO_TEXTURE: u32 = u32::MAX;
+
+/// A surface: Lambert and Blinn.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Material {
+    /// Linear albedo, Kd.
+    pub diffuse: Vec3,
+    /// Layer of the texture array, or [`NO_TEXTURE`].
+    pub diffuse_texture: u32,
+    /// Linear, Ks.
+    pub specular: Vec3,
+    /// Blinn exponent, Ns.
+    pub shininess: f32,
+}
+
+/// A point that stands for a piece of surface in imperfect shadow maps.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct ScenePoint {
+    /// Object space.
+    pub position: Vec3,
+    /// The surface it stands for, in square world units at time 0.
+    pub area: f32,
+    /// Unit geometric normal, object space.
+    pub normal: Vec3,
+    /// Index of the [`Object`].
+    pub object: u32,
+}
+
+impl View {
+    /// The perspective view of an eye at `origin` that looks at `target`.
+    ///
+    /// forward = normalize(target − origin), right = normalize(forward × up), up' = right × forward. `fov_x_rad` is the full
+    /// horizontal angle, `aspect` width over height. Clip space is wgpu's: y up, depth 1 at `near` and 0 at infinity. Where the
+    /// eye is on its target or looks along `up`, another axis is taken, so that the view is always a valid one.
+    ///
+    /// Computed in 64 bits and rounded once.
+    pub fn perspective(origin: Vec3, target: Vec3, up: Vec3, fov_x_rad: f32, aspect: f32, near: f32, far: f32) -> Self {
+        let (right, up, forward) = basis(origin.as_dvec3(), target.as_dvec3(), up.as_dvec3());
+        let tan_half_x = (f64::from(fov_x_rad) / 2.0).tan();
+        let tan_half_y = tan_half_x / f64::from(aspect);
+        let eye = origin.as_dvec3();
+        let row = |axis: DVec3| axis.extend(-axis.dot(eye)).as_vec4();
+        let rows = [row(right / tan_half_x), row(up / tan_half_y), Vec4::new(0.0, 0.0, 0.0, near), row(forward)];
+        Self {
+            clip_from_world: Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose(),
+            origin,
+            near,
+            right: right.as_vec3(),
+            tan_half_x: tan_half_x as f32,
+            up: up.as_vec3(),
+            tan_half_y: tan_half_y as f32,
+            forward: forward.as_vec3(),
+            far,
+        }
+    }
+}
+
+/// Right, up and forward of an eye. Defined for every input: see [`View::perspective`].
+fn basis(origin: DVec3, target: DVec3, up: DVec3) -> (DVec3, DVec3, DVec3) {
+    let forward = (target - origin).try_normalize().unwrap_or(DVec3::NEG_Z);
+    let right = [up, DVec3::Y, DVec3::Z, DVec3::X]
+        .into_iter()
+        .filter_map(DVec3::try_normalize)
+        .map(|up| forward.cross(up))
+        .find(|right| right.length_squared() > SMALLEST_SINE * SMALLEST_SINE)
+        .map_or(DVec3::X, DVec3::normalize);
+    (right, right.cross(forward), forward)
+}
+
+/// Sine of the angle to `up` below which a view counts as looking along it: the picture's roll would be rounding noise.
+const SMALLEST_SINE: f64 = 1e-6;
+
+/// A Rust type with a WGSL counterpart.
+trait WgslType {
+    /// Its WGSL type.
+    const KIND: MemberKind;
+}
+
+/// A scalar, vector or matrix.
+const fn numeric(scalar: Scalar, rows: u32, columns: u32, column_stride: u32) -> MemberKind {
+    MemberKind::Numeric { scalar, rows, columns, column_stride }
+}
+
+impl WgslType for f32 {
+    const KIND: MemberKind = numeric(Scalar::F32, 1, 1, 0);
+}
+
+impl WgslType for u32 {
+    const KIND: MemberKind = numeric(Scalar::U32, 1, 1, 0);
+}
+
+impl WgslType for Vec3 {
+    const KIND: MemberKind = numeric(Scalar::F32, 3, 1, 0);
+}
+
+impl WgslType for Mat4 {
+    const KIND: MemberKind = numeric(Scalar::F32, 4, 4, 16);
+}
+
+/// The WGSL type of a member's value.
+fn kind_of<T: WgslType>(_: &T) -> MemberKind {
+    T::KIND
+}
+
+/// The name and layout of a structure. A member that is left out does not compile.
+macro_rules! layout {
+    ($name:ident { $($member:ident),* }) => {{
+        let $name { $($member),* } = $name::zeroed();
+        let members = vec![$(Member {
+            name: stringify!($member).to_owned(),
+            offset: std::mem::offset_of!($name, $member) as u32,
+            kind: kind_of(&$member),
+        }),*];
+        (stringify!($name), Layout { size: size_of::<$name>() as u32, members })
+    }};
+}
+
+/// The names and layouts of all structures of this module that shaders read.
+pub fn layouts() -> Vec<(&'static str, Layout)> {
+    vec![
+        layout!(View { clip_from_world, origin, near, right, tan_half_x, up, tan_half_y, forward, far }),
+        layout!(SpotLight { position, beam_rad, direction, cutoff_rad, intensity, falloff }),
+        layout!(Frame { index, seed, time, delta_time }),
+        layout!(SceneInfo {
+            bounds_min, diagonal, bounds_max, total_area, area_min, area_max, edge_min, edge_max, triangle_count, object_count, light_count,
+            texture_count
+        }),
+        layout!(Vertex { position, u, normal, v }),
+        layout!(Triangle { a, b, c, object, material }),
+        layout!(Object { world_from_object, normal_from_object }),
+        layout!(Material { diffuse, diffuse_texture, specular, shininess }),
+        layout!(ScenePoint { position, area, normal, object }),
+    ]
+}

@@ -1,0 +1,66 @@
+//! Scenes for manylight: meshes, materials, textures, spot lights, a camera and their motion, read from RON, OBJ, MTL and picture files into
+//! the structures that shaders read.
+//!
+//! ```
+//! use manylight_scene::Scene;
+//! # let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets");
+//!
+//! let scene = Scene::load(format!("{folder}/moving.ron"))?;
+//! assert!(scene.features()["moving_lights"]);
+//!
+//! let state = scene.sample(2.5);
+//! let view = state.camera_view(16.0 / 9.0);
+//! assert!(view.forward.is_normalized() && state.light().intensity.x > 0.0);
+//! # Ok::<(), manylight_graph::diagnostics::Diagnostics>(())
+//! ```
+//!
+//! - [`scene`]: [`Scene`], how it is loaded, what it has.
+//! - [`state`]: [`SceneState`], the scene at one time.
+//! - [`motion`]: key frames.
+//! - [`points`]: points on the surfaces for imperfect shadow maps.
+//! - [`gpu_data`]: the structures that shaders read, and their layouts.
+//! - [`files`]: reading from disk, from the program itself, or from anywhere else.
+//! - [`bounds`]: axis-aligned boxes.
+//!
+//! # Scene files
+//!
+//! ```ron
+//! Scene(
+//!     meshes: [
+//!         "box.obj",                                     // relative to this file
+//!         Mesh(
+//!             file: "ball.obj",
+//!             name: "ball",
+//!             transform: (translate: (1.0, 0.5, 2.0), rotate_deg: (axis: (0.0, 1.0, 0.0), angle: 30.0), scale: 0.5),
+//!             motion: [(time: 0.0), (time: 2.0, translate: (3.0, 0.5, 2.0))], // what a key leaves out is as in `transform`
+//!             repeat: loop,                              // or clamp (default)
+//!         ),
+//!     ],
+//!     camera: (origin: (0.0, 1.0, 5.0), target: (0.0, 1.0, 0.0), up: (0.0, 1.0, 0.0), fov_x_deg: 50.0),
+//!     lights: [
+//!         Spot(position: (0.0, 2.0, 0.0), target: (0.0, 0.0, 0.0), intensity: (9.0, 9.0, 9.0), // W/sr; or one number
+//!              beam_deg: 20.0, cutoff_deg: 30.0, falloff: linear), // half-angles; linear, cosine or smooth
+//!     ],
+//!     materials: {"white": (diffuse: (0.7, 0.7, 0.7), specular: 0.2, shininess: 50.0, texture: "wood.png")},
+//! )
+//! ```
+//!
+//! Only `meshes` is needed. A camera or a light that is missing is fitted to the meshes, with a warning. `rotate_deg` may also be three angles:
+//! about x, then y, then z. Cameras (`origin`, `target`, `up`, `fov_x_deg`) and lights (`position`, `target`, `intensity`) take `motion` and
+//! `repeat` in the same way. Values are mixed linearly from key to key, rotations on the shortest arc.
+
+pub mod bounds;
+mod file;
+pub mod files;
+mod fit;
+pub mod gpu_data;
+mod import;
+pub mod motion;
+pub mod points;
+mod random;
+pub mod scene;
+pub mod state;
+
+pub use import::{DEFAULT_SHININESS, MAX_TEXTURE_SIZE, Material, Mesh, MeshStatistics, MeshTriangle, Textures};
+pub use scene::{Light, Scene, SceneObject};
+pub use state::SceneState;

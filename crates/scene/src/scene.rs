@@ -1,0 +1,148 @@
+//! A scene in host memory, and how it is loaded.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use manylight_graph::diagnostics::Diagnostics;
+
+use crate::{
+    bounds::Bounds,
+    file,
+    files::{Disk, FileReader},
+    gpu_data::{self, Falloff},
+    import::{Material, Mesh, Textures},
+    motion::{CameraPose, LightPose, Pose, Track},
+};
+
+/// A mesh somewhere in the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneObject {
+    /// As named in the scene file, else the stem of its mesh's file.
+    pub name: String,
+    /// Index of its mesh.
+    pub mesh: usize,
+    /// Where it is.
+    pub pose: Track<Pose>,
+    /// Bounds and area in world space where it starts.
+    pub(crate) at_rest: Extent,
+}
+
+/// Extent of an object in world space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Extent {
+    pub(crate) bounds: Bounds,
+    pub(crate) area: f64,
+}
+
+/// A spot light.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Light {
+    /// Where it is, where it points and how strong it is.
+    pub pose: Track<LightPose>,
+    /// Half-angle of full intensity in degrees.
+    pub beam_deg: f32,
+    /// Half-angle beyond which it is dark, in degrees; below 90.
+    pub cutoff_deg: f32,
+    /// Between the two.
+    pub falloff: Falloff,
+}
+
+/// Everything there is to render, over all time. [`Scene::sample`] gives it at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// Stem of the file's name.
+    pub name: String,
+    /// Meshes; each file once.
+    pub meshes: Vec<Mesh>,
+    /// Instances of meshes; at least one.
+    pub objects: Vec<SceneObject>,
+    /// Materials of all meshes.
+    pub materials: Vec<Material>,
+    /// Textures of all materials.
+    pub textures: Textures,
+    /// Lights; empty only if the file says so.
+    pub lights: Vec<Light>,
+    /// The camera.
+    pub camera: Track<CameraPose>,
+    /// What was mended or made up while loading.
+    pub warnings: Diagnostics,
+    /// Every file read or looked for: when one changes, the scene may.
+    pub sources: Vec<PathBuf>,
+    /// Hash of the contents of all files: equal hash, equal scene.
+    pub hash: u64,
+}
+
+impl Scene {
+    /// Loads a scene file (`.ron`) or a mesh (`.obj`) from disk.
+    ///
+    /// # Errors
+    /// All faults of the scene file, and meshes that cannot be used.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, Diagnostics> {
+        Self::load_with(path, &Disk)
+    }
+
+    /// Loads a scene file or a mesh from anywhere, for example from an [`Embedded`](crate::files::Embedded) set of files.
+    ///
+    /// # Errors
+    /// All faults of the scene file, and meshes that cannot be used.
+    pub fn load_with(path: impl AsRef<Path>, reader: &dyn FileReader) -> Result<Self, Diagnostics> {
+        file::load(path.as_ref(), reader)
+    }
+
+    /// What the scene has, for conditions in pipelines.
+    pub fn features(&self) -> BTreeMap<String, bool> {
+        let normals = self.meshes.iter().flat_map(|mesh| &mesh.vertices).any(|vertex| vertex.normal != glam::Vec3::ZERO);
+        let features = [
+            ("textures", self.textures.count > 0),
+            ("glossy", self.materials.iter().any(|material| material.specular != glam::Vec3::ZERO)),
+            ("moving_objects", self.objects.iter().any(|object| object.pose.moves())),
+            ("moving_lights", self.lights.iter().any(|light| light.pose.moves())),
+            ("moving_camera", self.camera.moves()),
+            ("several_lights", self.lights.len() > 1),
+            ("normals", normals),
+        ];
+        features.into_iter().map(|(name, on)| (name.to_owned(), on)).collect()
+    }
+
+    /// Number of triangles of all objects.
+    pub fn triangle_count(&self) -> usize {
+        self.objects.iter().map(|object| self.meshes[object.mesh].triangles.len()).sum()
+    }
+
+    /// The vertices of all meshes, one mesh after the other.
+    pub fn gpu_vertices(&self) -> Vec<gpu_data::Vertex> {
+        self.meshes.iter().flat_map(|mesh| &mesh.vertices).copied().collect()
+    }
+
+    /// The triangles of all objects, one object after the other, with indices into [`Scene::gpu_vertices`].
+    pub fn gpu_triangles(&self) -> Vec<gpu_data::Triangle> {
+        let mut first_vertex = Vec::with_capacity(self.meshes.len());
+        let mut next = 0;
+        for mesh in &self.meshes {
+            first_vertex.push(next);
+            next += mesh.vertices.len() as u32;
+        }
+        let mut triangles = Vec::with_capacity(self.triangle_count());
+        for (index, object) in self.objects.iter().enumerate() {
+            let first = first_vertex[object.mesh];
+            triangles.extend(self.meshes[object.mesh].triangles.iter().map(|triangle| {
+                let [a, b, c] = triangle.vertices.map(|i| first + i);
+                gpu_data::Triangle { a, b, c, object: index as u32, material: triangle.material }
+            }));
+        }
+        triangles
+    }
+
+    /// The materials.
+    pub fn gpu_materials(&self) -> Vec<gpu_data::Material> {
+        let convert = |material: &Material| gpu_data::Material {
+            diffuse: material.diffuse,
+            diffuse_texture: material.texture.unwrap_or(gpu_data::NO_TEXTURE),
+            specular: material.specular,
+            shininess: material.shininess,
+        };
+        self.materials.iter().map(convert).collect()
+    }
+}

@@ -1,0 +1,179 @@
+//! A scene at one time.
+
+use glam::{DMat3, DMat4, DVec3, Mat4};
+
+use crate::{
+    bounds::Bounds,
+    gpu_data::{Object, SceneInfo, SpotLight, View},
+    import::Mesh,
+    motion::{CameraPose, LightPose, Pose},
+    scene::{Extent, Light, Scene},
+};
+
+/// Everything that changes with time, ready for the GPU.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneState {
+    /// Seconds.
+    pub time: f64,
+    /// Where the objects are.
+    pub objects: Vec<Object>,
+    /// The lights.
+    pub lights: Vec<SpotLight>,
+    /// The camera; [`SceneState::camera_view`] makes a view of it.
+    pub camera: CameraPose,
+    /// Around all objects, world space. Tight around objects that stand still, loose around others.
+    pub bounds: Bounds,
+    /// Extent and statistics.
+    pub info: SceneInfo,
+    light_poses: Vec<LightPose>,
+}
+
+/// Distance of the near plane over the diagonal of the scene. With reverse z in 32-bit floats a near plane this close costs no precision.
+const NEAR: f64 = 1e-3;
+/// The near plane is never farther than this share of the distance from the camera to its target.
+const NEAR_OF_TARGET: f64 = 1e-2;
+/// … but never nearer than this share of the diagonal: a camera on its target still has a view.
+const NEAR_AT_LEAST: f64 = 1e-6;
+
+impl Scene {
+    /// The scene at a time in seconds.
+    pub fn sample(&self, time: f64) -> SceneState {
+        let mut bounds = Bounds::EMPTY;
+        let mut area = 0.0;
+        let mut objects = Vec::with_capacity(self.objects.len());
+        for object in &self.objects {
+            let pose = object.pose.at(time);
+            let extent = if object.pose.moves() { extent_moving(&self.meshes[object.mesh], &pose) } else { object.at_rest };
+            bounds = bounds.union(extent.bounds);
+            area += extent.area;
+            objects.push(Object {
+                world_from_object: pose.world_from_object().as_mat4(),
+                normal_from_object: Mat4::from_mat3(normal_from_object(&pose).as_mat3()),
+            });
+        }
+        let light_poses: Vec<_> = self.lights.iter().map(|light| light.pose.at(time)).collect();
+        let statistics = |pick: fn(&Mesh) -> f64| self.objects.iter().map(move |object| pick(&self.meshes[object.mesh]));
+        let info = SceneInfo {
+            bounds_min: bounds.min.as_vec3(),
+            diagonal: bounds.diagonal() as f32,
+            bounds_max: bounds.max.as_vec3(),
+            total_area: area as f32,
+            area_min: statistics(|mesh| mesh.statistics.area_min).fold(f64::INFINITY, f64::min) as f32,
+            area_max: statistics(|mesh| mesh.statistics.area_max).fold(0.0, f64::max) as f32,
+            edge_min: statistics(|mesh| mesh.statistics.edge_min).fold(f64::INFINITY, f64::min) as f32,
+            edge_max: statistics(|mesh| mesh.statistics.edge_max).fold(0.0, f64::max) as f32,
+            triangle_count: self.triangle_count() as u32,
+            object_count: self.objects.len() as u32,
+            light_count: self.lights.len() as u32,
+            texture_count: self.textures.count,
+        };
+        SceneState {
+            time,
+            objects,
+            lights: self.lights.iter().zip(&light_poses).map(|(light, pose)| spot_light(light, pose)).collect(),
+            camera: self.camera.at(time),
+            bounds,
+            info,
+            light_poses,
+        }
+    }
+}
+
+impl SceneState {
+    /// The camera for a picture of width / height = `aspect`.
+    ///
+    /// Near plane: 1/1000 of the scene's diagonal, or 1/100 of the distance to the target where that is less. `far` is twice the diagonal
+    /// and the distance to the scene's bounds.
+    pub fn camera_view(&self, aspect: f32) -> View {
+        let CameraPose { origin, target, up, fov_x_deg } = self.camera;
+        let diagonal = self.bounds.diagonal();
+        let distance = origin.as_dvec3().distance(target.as_dvec3());
+        let near = (NEAR * diagonal).min(NEAR_OF_TARGET * distance).max(NEAR_AT_LEAST * diagonal);
+        View::perspective(origin, target, up, fov_x_deg.to_radians(), aspect, near as f32, self.far(origin.as_dvec3()))
+    }
+
+    /// The first light, or a dark one if the scene has none.
+    pub fn light(&self) -> SpotLight {
+        self.lights.first().copied().unwrap_or_else(|| {
+            let position = self.bounds.centre().as_vec3();
+            let (beam_rad, cutoff_rad) = (DARK_BEAM_RAD, DARK_CUTOFF_RAD);
+            SpotLight { position, beam_rad, direction: glam::Vec3::NEG_Y, cutoff_rad, intensity: glam::Vec3::ZERO, falloff: 0 }
+        })
+    }
+
+    /// The first light (or the dark one) as a square view whose full field of view is twice the cut-off.
+    pub fn light_view(&self) -> View {
+        self.light_view_of(0)
+    }
+
+    /// A light as a square view whose full field of view is twice the cut-off.
+    pub fn light_view_of(&self, index: usize) -> View {
+        let light = self.lights.get(index).copied().unwrap_or_else(|| self.light());
+        let origin = light.position;
+        let target = self.light_poses.get(index).map(|pose| pose.target).filter(|target| *target != origin);
+        let target = target.unwrap_or(origin + light.direction * self.info.diagonal);
+        let near = (NEAR * self.bounds.diagonal()) as f32;
+        View::perspective(origin, target, glam::Vec3::Y, 2.0 * light.cutoff_rad, 1.0, near, self.far(origin.as_dvec3()))
+    }
+
+    /// A distance from a point beyond everything in the scene.
+    fn far(&self, origin: DVec3) -> f32 {
+        (2.0 * (self.bounds.diagonal() + self.bounds.distance(origin))) as f32
+    }
+}
+
+/// Cone of the light of a scene without lights.
+const DARK_BEAM_RAD: f32 = 0.5;
+const DARK_CUTOFF_RAD: f32 = 0.6;
+
+fn spot_light(light: &Light, pose: &LightPose) -> SpotLight {
+    SpotLight {
+        position: pose.position,
+        beam_rad: light.beam_deg.to_radians(),
+        direction: pose.direction(),
+        cutoff_rad: light.cutoff_deg.to_radians(),
+        intensity: pose.intensity,
+        falloff: light.falloff as u32,
+    }
+}
+
+/// Exact extent of a mesh in a pose.
+pub(crate) fn extent(mesh: &Mesh, pose: &Pose) -> Extent {
+    let matrix = pose.world_from_object();
+    let mut bounds = Bounds::EMPTY;
+    let mut area = 0.0;
+    for triangle in &mesh.triangles {
+        let corners = mesh.corners(triangle).map(|corner| matrix.transform_point3(corner));
+        area += crate::import::area(&corners);
+        corners.into_iter().for_each(|corner| bounds.add(corner));
+    }
+    Extent { bounds, area }
+}
+
+/// Extent of a mesh that moves: its bounds are those of the turned bounding box, so that a frame does not visit every vertex.
+fn extent_moving(mesh: &Mesh, pose: &Pose) -> Extent {
+    let scale = pose.scale.as_dvec3().abs();
+    let uniform = scale.max_element() - scale.min_element() <= 1e-6 * scale.max_element();
+    let bounds = mesh.statistics.bounds.transformed(&pose.world_from_object());
+    let area = if uniform { mesh.statistics.area * scale.x * scale.x } else { extent(mesh, pose).area };
+    Extent { bounds, area }
+}
+
+/// The inverse transpose up to a positive factor. As cofactors it exists for flattened objects, too; where it loses an axis (an object scaled
+/// to nothing), the rotation alone is taken.
+fn normal_from_object(pose: &Pose) -> DMat3 {
+    let [a, b, c] = linear_part(&pose.world_from_object());
+    let cofactors = [b.cross(c), c.cross(a), a.cross(b)];
+    let sign = if a.dot(cofactors[0]) < 0.0 { -1.0 } else { 1.0 };
+    let longest = cofactors.iter().map(|v| v.length()).fold(0.0, f64::max);
+    if cofactors.iter().any(|v| v.length() <= f64::from(f32::EPSILON) * longest) {
+        let [a, b, c] = linear_part(&Pose { scale: glam::Vec3::ONE, ..*pose }.world_from_object());
+        return DMat3::from_cols(a, b, c);
+    }
+    DMat3::from_cols(cofactors[0], cofactors[1], cofactors[2]) * (sign / longest)
+}
+
+/// Columns of the linear part.
+fn linear_part(matrix: &DMat4) -> [DVec3; 3] {
+    [matrix.x_axis.truncate(), matrix.y_axis.truncate(), matrix.z_axis.truncate()]
+}

@@ -1,0 +1,14 @@
+//! Tests of scenes: files, import, motion, GPU data and points.
+
+#![allow(clippy::unwrap_used)]
+
+mod assets;
+mod gpu_data;
+mod import;
+mod memory;
+mod motion;
+mod points;
+mod robustness;
+mod scene_file;
+mod state;
+mod textures;

@@ -1,0 +1,128 @@
+//! Scenes at a time.
+
+use glam::Vec3;
+use manylight_scene::gpu_data::Falloff;
+
+use crate::memory::{obj, ron};
+
+#[test]
+fn objects_move_and_carry_their_area() {
+    let scene = ron("Scene(meshes: [
+        Mesh(file: \"tri.obj\", motion: [(time: 0.0), (time: 2.0, translate: (10.0, 0.0, 0.0), scale: 3.0)]),
+        Mesh(file: \"tri.obj\", name: \"still\", transform: (translate: (0.0, 5.0, 0.0), rotate_deg: (0.0, 0.0, 90.0), scale: (2.0, 1.0, 1.0))),
+    ])")
+    .unwrap();
+    assert_eq!(scene.meshes.len(), 1, "one file is one mesh");
+    assert_eq!((scene.objects[0].name.as_str(), scene.objects[1].name.as_str()), ("tri", "still"));
+    let start = scene.sample(0.0);
+    assert!((start.info.total_area - 1.5).abs() < 1e-6);
+    let end = scene.sample(2.0);
+    assert!((end.info.total_area - (4.5 + 1.0)).abs() < 1e-5);
+    let world = end.objects[0].world_from_object.transform_point3(Vec3::X);
+    assert!(world.distance(Vec3::new(13.0, 0.0, 0.0)) < 1e-5);
+    assert_eq!(end.info.bounds_max.x, 13.0);
+    assert_eq!(end.info.bounds_min.x, -1.0, "the turned triangle reaches to −1");
+    // Scaled by 2 along its x, then turned by 90° about z: x goes to y.
+    let turned = end.objects[1].world_from_object.transform_point3(Vec3::X);
+    assert!(turned.distance(Vec3::new(0.0, 7.0, 0.0)) < 1e-5, "{turned}");
+}
+
+#[test]
+fn normals_stay_normal_under_uneven_and_mirrored_scales() {
+    let scene = ron("Scene(meshes: [Mesh(file: \"tri.obj\", transform: (rotate_deg: (30.0, 40.0, 50.0), scale: (2.0, -0.5, 3.0)))])").unwrap();
+    let object = scene.sample(0.0).objects[0];
+    // A plane with normal n and tangents t, u.
+    let (n, t, u) = (Vec3::new(1.0, 2.0, 2.0) / 3.0, Vec3::new(2.0, -2.0, 1.0), Vec3::new(2.0, 1.0, -2.0));
+    let moved = object.normal_from_object.transform_vector3(n);
+    for tangent in [t, u] {
+        assert!(moved.dot(object.world_from_object.transform_vector3(tangent)).abs() < 1e-5);
+    }
+    // The side is kept: a point on the normal's side stays there.
+    assert!(moved.dot(object.world_from_object.transform_vector3(n)) > 0.0);
+}
+
+#[test]
+fn an_object_scaled_to_nothing_has_finite_normals() {
+    let scene = ron("Scene(meshes: [\"room.obj\", Mesh(file: \"tri.obj\", motion: [(time: 0.0), (time: 1.0, scale: 0.0), (time: 2.0, scale: (1.0, 0.0, 1.0))])])").unwrap();
+    for time in [0.0, 0.5, 1.0, 1.5, 2.0] {
+        let state = scene.sample(time);
+        let matrix = state.objects[1].normal_from_object;
+        assert!(matrix.is_finite());
+        for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+            assert!(matrix.transform_vector3(axis).length() > 1e-9, "time {time}");
+        }
+        assert!(state.info.total_area.is_finite() && state.info.diagonal.is_finite());
+    }
+}
+
+#[test]
+fn the_light_moves_and_its_view_is_its_cone() {
+    let scene = ron("Scene(meshes: [\"room.obj\"], lights: [Spot(position: (0.0, 0.0, 0.0), target: (0.0, 0.0, 1.0), intensity: 2.0,
+        beam_deg: 10.0, cutoff_deg: 30.0, falloff: cosine,
+        motion: [(time: 0.0), (time: 1.0, position: (1.0, 0.0, 0.0), target: (1.0, -1.0, 0.0), intensity: (4.0, 6.0, 8.0))])])")
+    .unwrap();
+    let state = scene.sample(0.5);
+    let light = state.light();
+    assert_eq!(light.position, Vec3::new(0.5, 0.0, 0.0));
+    assert_eq!(light.intensity, Vec3::new(3.0, 4.0, 5.0));
+    assert_eq!(light.falloff, Falloff::Cosine as u32);
+    assert!(light.direction.distance(Vec3::new(0.0, -0.5, 0.5).normalize()) < 1e-6);
+    let view = state.light_view();
+    assert_eq!(view.forward, light.direction);
+    assert!((view.tan_half_x - 30_f32.to_radians().tan()).abs() < 1e-6 && view.tan_half_x == view.tan_half_y);
+    assert!((light.cutoff_rad - 30_f32.to_radians()).abs() < 1e-6);
+    assert!(scene.features()["moving_lights"] && !scene.features()["several_lights"]);
+}
+
+#[test]
+fn near_and_far_hold_the_scene() {
+    for scale in [1e-3_f32, 1.0, 1e4] {
+        let scene = ron(&format!("Scene(meshes: [Mesh(file: \"room.obj\", transform: (scale: {scale:?}))])")).unwrap();
+        let state = scene.sample(0.0);
+        let view = state.camera_view(1.0);
+        let diagonal = state.info.diagonal;
+        assert!((diagonal / (scale * 12_f32.sqrt()) - 1.0).abs() < 1e-5);
+        assert!(view.near > 0.0 && view.near <= 1e-3 * diagonal * 1.001);
+        for corner in state.bounds.corners() {
+            assert!(view.far > (corner.as_vec3() - view.origin).length());
+        }
+        assert!(state.light_view().near < 2e-3 * diagonal);
+    }
+}
+
+#[test]
+fn fitted_camera_and_light_see_and_light_the_scene() {
+    let scene = obj(crate::memory::ROOM).unwrap();
+    assert_eq!(scene.warnings.0.len(), 2 + 3, "{:?}", crate::memory::summary(&scene.warnings));
+    let state = scene.sample(0.0);
+    for aspect in [0.5, 1.0, 16.0 / 9.0] {
+        let view = state.camera_view(aspect);
+        for corner in state.bounds.corners() {
+            let clip = view.clip_from_world * corner.as_vec3().extend(1.0);
+            assert!(clip.x.abs() <= clip.w && clip.y.abs() <= clip.w && clip.w > view.near, "{aspect}: {clip}");
+        }
+    }
+    let light = state.light();
+    let distance = light.position.distance(state.bounds.centre().as_vec3());
+    assert!((light.intensity.x / distance.powi(2) - std::f32::consts::PI).abs() < 1e-4);
+    assert!(state.bounds.distance(light.position.as_dvec3()) == 0.0 && light.position.y > 0.5);
+    assert!(light.direction.dot(-light.position.normalize()) > 0.999);
+}
+
+#[test]
+fn a_flat_scene_is_lit_from_above() {
+    let scene = obj("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n").unwrap();
+    let state = scene.sample(0.0);
+    assert!(state.light().position.y > 0.1);
+    assert!(state.camera_view(1.0).clip_from_world.is_finite());
+}
+
+#[test]
+fn no_lights_is_dark() {
+    let scene = ron("Scene(meshes: [\"tri.obj\"], lights: [])").unwrap();
+    crate::memory::assert_says(&scene.warnings, "", &["black"]);
+    let state = scene.sample(0.0);
+    assert_eq!(state.light().intensity, Vec3::ZERO);
+    assert!(state.light_view().clip_from_world.is_finite());
+    assert_eq!(state.info.light_count, 0);
+}

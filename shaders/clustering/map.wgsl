@@ -1,0 +1,124 @@
+// Mapping of RSM texels to clusters. [ACRSM] 4.6, 5.3.1.
+// Differs from the paper: texels look for clusters instead of clusters drawing squares over texels; a group of 16×16 texels first lists the clusters
+// whose window reaches it, so the cost per texel is the number of windows that overlap there, and the result needs no depth test.
+// Ties go to the lower index. What bounds it: k distance computations per texel with `exact`, texture reads otherwise.
+
+#import common::scene::{View, SceneInfo}
+#import common::view::pixel_direction
+#import common::octahedral::unpack_unit
+#import common::cluster::{Cluster, CLUSTER_ACTIVE, NO_CLUSTER, MAX_CLUSTERS}
+#import common::metric::{Metric, cluster_distance}
+#import common::radiometry::max_component
+
+struct Params {
+    clusters: u32,
+    window: u32,
+    weight_position: f32,
+    weight_normal: f32,
+    weight_importance: f32,
+}
+
+@group(0) @binding(0) var<storage, read> clusters_warped: array<Cluster>;
+@group(0) @binding(1) var rsm_flux: texture_2d<f32>;
+@group(0) @binding(2) var rsm_normal: texture_2d<u32>;
+@group(0) @binding(3) var rsm_distance: texture_2d<f32>;
+@group(0) @binding(4) var importance: texture_2d<f32>;
+@group(0) @binding(5) var<uniform> scene_light_view: View;
+@group(0) @binding(6) var<uniform> scene_info: SceneInfo;
+@group(0) @binding(7) var<uniform> params: Params;
+@group(0) @binding(8) var cluster_map: texture_storage_2d<r32uint, write>;
+@group(0) @binding(9) var<storage, read_write> cluster_bounds: array<atomic<u32>>;
+
+override mapping_is_exact: bool;
+override normal_distance_is_signed: bool;
+
+const GROUP: u32 = 16u;
+const LIST_WORDS: u32 = MAX_CLUSTERS / 32u;
+
+// Bit c: cluster c competes in this group of texels.
+var<workgroup> competitors: array<atomic<u32>, LIST_WORDS>;
+
+@compute @workgroup_size(64)
+fn clear(@builtin(global_invocation_id) id: vec3u) {
+    if id.x < arrayLength(&cluster_bounds) {
+        // Rectangles start inside out; the counter at the end starts at zero.
+        let least = id.x < 4u * MAX_CLUSTERS && id.x % 4u < 2u;
+        atomicStore(&cluster_bounds[id.x], select(0u, 0xffffffffu, least));
+    }
+}
+
+fn in_window(texel: vec2f, centre: vec2f) -> bool {
+    let offset = abs(texel - centre);
+    return max(offset.x, offset.y) <= 0.5 * f32(params.window);
+}
+
+@compute @workgroup_size(16, 16)
+fn assign(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    if lane < LIST_WORDS {
+        atomicStore(&competitors[lane], 0u);
+    }
+    workgroupBarrier();
+    let first = vec2f(group.xy * GROUP);
+    for (var c = lane; c < params.clusters; c += GROUP * GROUP) {
+        if clusters_warped[c].state == CLUSTER_ACTIVE {
+            // The texel of the group that is nearest to the centre.
+            let nearest = clamp(clusters_warped[c].texel, first, first + f32(GROUP));
+            if mapping_is_exact || in_window(nearest, clusters_warped[c].texel) {
+                atomicOr(&competitors[c / 32u], 1u << (c % 32u));
+            }
+        }
+    }
+    workgroupBarrier();
+
+    let size = textureDimensions(cluster_map);
+    if any(id.xy >= size) {
+        return;
+    }
+    if max_component(textureLoad(rsm_flux, id.xy, 0).rgb) <= 0.0 {
+        textureStore(cluster_map, id.xy, vec4u(NO_CLUSTER));
+        return;
+    }
+
+    let position = scene_light_view.origin + pixel_direction(scene_light_view, id.xy, size) * textureLoad(rsm_distance, id.xy, 0).x;
+    let normal = unpack_unit(textureLoad(rsm_normal, id.xy, 0).x);
+    let rho = textureLoad(importance, id.xy, 0).x;
+    let metric = Metric(params.weight_position, params.weight_normal, params.weight_importance, max(scene_info.diagonal, 1e-30), normal_distance_is_signed);
+    let texel = vec2f(id.xy) + 0.5;
+    var best = NO_CLUSTER;
+    var best_distance = 3.0e38;
+    for (var word = 0u; word < LIST_WORDS; word++) {
+        var bits = atomicLoad(&competitors[word]);
+        while bits != 0u {
+            let c = word * 32u + countTrailingZeros(bits);
+            bits &= bits - 1u;
+            if !mapping_is_exact && !in_window(texel, clusters_warped[c].texel) {
+                continue;
+            }
+            let d = cluster_distance(metric, clusters_warped[c].position, clusters_warped[c].normal, clusters_warped[c].importance, position, normal, rho);
+            if d < best_distance {
+                best = c;
+                best_distance = d;
+            }
+        }
+    }
+    if best == NO_CLUSTER {
+        // No window holds it: the nearest of all takes its energy, and it is counted.
+        for (var c = 0u; c < params.clusters; c++) {
+            if clusters_warped[c].state == CLUSTER_ACTIVE {
+                let d = cluster_distance(metric, clusters_warped[c].position, clusters_warped[c].normal, clusters_warped[c].importance, position, normal, rho);
+                if d < best_distance {
+                    best = c;
+                    best_distance = d;
+                }
+            }
+        }
+        atomicAdd(&cluster_bounds[4u * MAX_CLUSTERS], 1u);
+    }
+    textureStore(cluster_map, id.xy, vec4u(best));
+    if best != NO_CLUSTER {
+        atomicMin(&cluster_bounds[4u * best], id.x);
+        atomicMin(&cluster_bounds[4u * best + 1u], id.y);
+        atomicMax(&cluster_bounds[4u * best + 2u], id.x);
+        atomicMax(&cluster_bounds[4u * best + 3u], id.y);
+    }
+}

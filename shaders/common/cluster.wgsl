@@ -1,0 +1,30 @@
+// A cluster of RSM texels: a virtual area light. [ACRSM] 5.1.2, table 5.2.
+
+// Not in use: beyond the active number, or parked because nothing is lit.
+const CLUSTER_IDLE: u32 = 0u;
+const CLUSTER_ACTIVE: u32 = 1u;
+// Waits for a place from the Halton sequence ...
+const CLUSTER_RESEED: u32 = 2u;
+// ... or has one already, near the cluster that was split.
+const CLUSTER_PLACED: u32 = 3u;
+
+// "No cluster" in a cluster map.
+const NO_CLUSTER: u32 = 0xffffffffu;
+// Room for clusters in every buffer of them; the active number is a parameter.
+const MAX_CLUSTERS: u32 = 512u;
+
+struct Cluster {
+    position: vec3f, // world space
+    area: f32, // m²
+    normal: vec3f, // unit length, world space
+    importance: f32, // mean, 0 to 1
+    flux: vec3f, // reflected, W
+    count: u32, // texels that belong to it
+    texel: vec2f, // its centre in the RSM, in texels
+    state: u32,
+    generation: u32, // how often it was seeded: picks the next point of the sequence
+    delta: f32, // [ACRSM] eq. 4.6
+    delta_mean: f32, // of its neighbourhood, eq. 4.7; equal to delta when it has no neighbour
+    cancelled: u32, // frames in a row in which the mean of its normals vanished and the old one was kept
+    spare: u32,
+}

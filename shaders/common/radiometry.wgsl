@@ -1,0 +1,38 @@
+// Light and its transport between surfaces. Units: W, W/sr, W/m², W/(m² sr), each for linear red, green, blue.
+
+#import common::scene::{SpotLight, FALLOFF_COSINE, FALLOFF_SMOOTH}
+
+const PI: f32 = 3.14159265358979;
+
+fn luminance(rgb: vec3f) -> f32 {
+    return dot(rgb, vec3f(0.2126, 0.7152, 0.0722)); // Rec. 709
+}
+
+fn max_component(rgb: vec3f) -> f32 {
+    return max(rgb.x, max(rgb.y, rgb.z));
+}
+
+// Share of the full intensity that a spot light sends along `direction` (unit, away from the light).
+fn spot_falloff(light: SpotLight, direction: vec3f) -> f32 {
+    let cosine = dot(light.direction, direction);
+    // atan2 keeps its precision at small angles, where acos of a number near 1 has none.
+    let angle = atan2(length(cross(light.direction, direction)), cosine);
+    if angle >= light.cutoff_rad {
+        return 0.0;
+    }
+    if light.falloff == FALLOFF_COSINE {
+        // [ACRSM] 5.1.1, fig. 5.1: exceeds 1 inside the cone.
+        return cosine / cos(light.cutoff_rad);
+    }
+    let t = saturate((light.cutoff_rad - angle) / max(light.cutoff_rad - light.beam_rad, 1e-6));
+    if light.falloff == FALLOFF_SMOOTH {
+        return t * t * (3.0 - 2.0 * t);
+    }
+    return t;
+}
+
+// Form factor from a disk of area `area` at distance² `d2` to a surface element, over the element's area: [ACRSM] eq. 5.5, after [WALLACE].
+// E = flux × this. Bounded by 1 / area where the disk touches the element; `area` = 0 is a point light. 1/m²
+fn disk_form_factor(cos_receiver: f32, cos_emitter: f32, d2: f32, area: f32) -> f32 {
+    return max(cos_receiver, 0.0) * max(cos_emitter, 0.0) / max(PI * d2 + area, 1e-30);
+}

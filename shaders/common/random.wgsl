@@ -1,0 +1,41 @@
+// Seeded pseudo-random and low-discrepancy numbers.
+
+// PCG hash (O'Neill; as a hash: Jarzynski and Olano 2020).
+fn hash(value: u32) -> u32 {
+    let state = value * 747796405u + 2891336453u;
+    let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    return (word >> 22u) ^ word;
+}
+
+fn hash3(a: u32, b: u32, c: u32) -> u32 {
+    return hash(a ^ hash(b ^ hash(c)));
+}
+
+// [0, 1), 24 bits.
+fn unit_float(bits: u32) -> f32 {
+    return f32(bits >> 8u) * 0x1p-24;
+}
+
+// Radical inverse in base 2, exact to 24 bits. [HALTON]
+fn radical_inverse_2(index: u32) -> f32 {
+    return f32(reverseBits(index) >> 8u) * 0x1p-24;
+}
+
+// Radical inverse in base 3: digits are gathered as a whole number, so the only rounding is the last division. [HALTON]
+fn radical_inverse_3(index: u32) -> f32 {
+    var n = index;
+    var digits = 0u;
+    var scale = 1u;
+    // 3^15 is the largest power of three that an f32 quotient still resolves.
+    for (var i = 0u; i < 15u && n > 0u; i++) {
+        digits = digits * 3u + n % 3u;
+        scale *= 3u;
+        n /= 3u;
+    }
+    return min(f32(digits) / f32(scale), 0x1.fffffep-1);
+}
+
+// Point `index` of the Halton sequence in bases 2 and 3, in [0, 1)².
+fn halton_23(index: u32) -> vec2f {
+    return vec2f(radical_inverse_2(index), radical_inverse_3(index));
+}

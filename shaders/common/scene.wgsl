@@ -1,0 +1,81 @@
+// Scene and frame data as Rust fills it (crate manylight-scene, module `gpu_data`); layouts are compared when a shader loads.
+
+// A pinhole camera or a light seen as one. World space, right-handed; all vectors have unit length.
+struct View {
+    clip_from_world: mat4x4f, // reverse z: 1 at `near`, 0 at infinity
+    origin: vec3f,
+    near: f32,
+    right: vec3f,
+    tan_half_x: f32, // tangent of half the horizontal field of view
+    up: vec3f,
+    tan_half_y: f32,
+    forward: vec3f,
+    far: f32, // a distance beyond everything in the scene
+}
+
+const FALLOFF_LINEAR: u32 = 0u;
+const FALLOFF_COSINE: u32 = 1u;
+const FALLOFF_SMOOTH: u32 = 2u;
+
+struct SpotLight {
+    position: vec3f,
+    beam_rad: f32, // half-angle of full intensity
+    direction: vec3f,
+    cutoff_rad: f32, // half-angle beyond which it is dark
+    intensity: vec3f, // W/sr
+    falloff: u32,
+}
+
+// Counters and sizes of the frame.
+struct Frame {
+    index: u32, // frames since the last reset
+    seed: u32,
+    time: f32, // scene time in seconds
+    delta_time: f32,
+}
+
+// Extent and statistics of the scene in world space at this time.
+struct SceneInfo {
+    bounds_min: vec3f,
+    diagonal: f32, // of the bounding box
+    bounds_max: vec3f,
+    total_area: f32,
+    area_min: f32, // smallest and largest triangle, before object transforms
+    area_max: f32,
+    edge_min: f32, // shortest and longest edge, before object transforms
+    edge_max: f32,
+    triangle_count: u32,
+    object_count: u32,
+    light_count: u32,
+    texture_count: u32,
+}
+
+// Object space.
+struct Vertex {
+    position: vec3f,
+    u: f32,
+    normal: vec3f, // zero: use the flat normal of the triangle
+    v: f32,
+}
+
+struct Triangle {
+    a: u32, // vertices
+    b: u32,
+    c: u32,
+    object: u32,
+    material: u32,
+}
+
+struct Object {
+    world_from_object: mat4x4f,
+    normal_from_object: mat4x4f, // inverse transpose; the upper left 3×3 counts
+}
+
+const NO_TEXTURE: u32 = 0xffffffffu;
+
+struct Material {
+    diffuse: vec3f, // linear albedo, Kd
+    diffuse_texture: u32, // layer of `scene_textures`, or NO_TEXTURE
+    specular: vec3f, // linear, Ks
+    shininess: f32, // Blinn exponent, Ns
+}

@@ -1,0 +1,80 @@
+//! What the tests share: paths, the program, and how to run it.
+
+use std::{
+    path::{Path, PathBuf},
+    process::{Command, Output},
+    sync::OnceLock,
+};
+
+/// The root of the repository.
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests lie in the workspace").to_path_buf()
+}
+
+/// The folder of scenes and references that cannot be part of the repository (their licences), when it is there.
+pub fn shared() -> Option<PathBuf> {
+    let folder = root().parent()?.join("shared");
+    folder.join("reference").is_dir().then_some(folder)
+}
+
+/// The built program. Built here if the test runner has not done so.
+fn program() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let test = std::env::current_exe().expect("a test has a path");
+        let folder = test.parent().and_then(Path::parent).expect("target/<profile>/deps/test");
+        let program = folder.join(format!("manylight{}", std::env::consts::EXE_SUFFIX));
+        let mut build = Command::new(env!("CARGO"));
+        build.args(["build", "--quiet", "--package", "manylight", "--bin", "manylight"]).current_dir(root());
+        if folder.ends_with("release") {
+            build.arg("--release");
+        }
+        assert!(build.status().expect("cargo runs").success(), "building the program failed");
+        program
+    })
+}
+
+/// What a run of the program said.
+pub struct Run {
+    /// Exit code; `None` when killed.
+    pub code: Option<i32>,
+    /// Standard output.
+    pub stdout: String,
+    /// Standard error.
+    pub stderr: String,
+}
+
+impl Run {
+    /// Fails with everything the program said unless the exit code is `code`.
+    #[track_caller]
+    pub fn expect(self, code: i32) -> Self {
+        assert_eq!(self.code, Some(code), "stdout:\n{}\nstderr:\n{}", self.stdout, self.stderr);
+        assert!(!self.stderr.contains("panicked at"), "a panic:\n{}", self.stderr);
+        self
+    }
+
+    /// Fails unless standard error or output contains each of `parts`.
+    #[track_caller]
+    pub fn says(self, parts: &[&str]) -> Self {
+        let all = format!("{}{}", self.stdout, self.stderr);
+        for part in parts {
+            assert!(all.contains(part), "`{part}` is not in:\n{all}");
+        }
+        self
+    }
+}
+
+/// Runs the program in the repository's root.
+pub fn manylight(arguments: &[&str]) -> Run {
+    manylight_in(&root(), arguments)
+}
+
+/// Runs the program in a folder.
+pub fn manylight_in(folder: &Path, arguments: &[&str]) -> Run {
+    let Output { status, stdout, stderr } = Command::new(program()).args(arguments).current_dir(folder).output().expect("the program starts");
+    Run {
+        code: status.code(),
+        stdout: String::from_utf8_lossy(&stdout).into_owned(),
+        stderr: String::from_utf8_lossy(&stderr).into_owned(),
+    }
+}
