@@ -55,7 +55,7 @@ struct Vertex {
     position: vec3f,
     u: f32,
     normal: vec3f, // zero: use the flat normal of the triangle
-    v: f32,
+    v: f32, // downwards: 0 is the top row of the picture
 }
 
 struct Triangle {

@@ -5,13 +5,11 @@ const MIN_PLANE_COSINE: f32 = 0.05;
 // The plane's distance is trusted within this factor of the receiver's.
 const PLANE_RANGE: f32 = 2.0;
 
-// Distance along `ray` (unit, from the light) at which it meets the tangent plane of the receiver at `to_receiver` (from the light).
-// On a flat receiver this is what the map itself holds, so that a surface does not shadow itself however coarse the map.
-fn receiver_distance(ray: vec3f, to_receiver: vec3f, normal: vec3f) -> f32 {
-    let own = length(to_receiver);
-    let cosine = dot(normal, ray);
-    if abs(cosine) < MIN_PLANE_COSINE {
-        return own;
-    }
-    return clamp(dot(normal, to_receiver) / cosine, own / PLANE_RANGE, own * PLANE_RANGE);
+// One over the distance along a ray from the light at which it meets the tangent plane of a receiver. On a flat receiver that is the distance which the
+// map itself holds, so that a surface does not shadow itself however coarse the map.
+// `cosine`: between the ray and the receiver's normal; `height`: receiver's offset from the light, along its normal; `own`: the receiver's distance.
+// The reciprocal, because it needs no division per ray.
+fn plane_reciprocal(cosine: f32, height: f32, own: f32) -> f32 {
+    let trusted = clamp(cosine / height, 1.0 / (PLANE_RANGE * own), PLANE_RANGE / own);
+    return select(1.0 / own, trusted, abs(cosine) >= MIN_PLANE_COSINE && height != 0.0);
 }

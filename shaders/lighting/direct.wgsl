@@ -4,7 +4,7 @@
 #import common::view::{pixel_direction, view_uv}
 #import common::octahedral::unpack_unit
 #import common::radiometry::{PI, spot_falloff, max_component}
-#import common::shadow::receiver_distance
+#import common::shadow::plane_reciprocal
 
 struct Params {
     pcf: u32,
@@ -29,7 +29,8 @@ fn shadow(position: vec3f, normal: vec3f) -> f32 {
     if seen.z <= 0.0 {
         return 0.0;
     }
-    let to_receiver = position - scene_light_view.origin;
+    let own = max(distance(position, scene_light_view.origin), 1e-30);
+    let height = dot(normal, position - scene_light_view.origin);
     let middle = vec2i(floor(seen.xy * vec2f(size)));
     let low = -i32(params.pcf - 1u) / 2;
     var lit = 0.0;
@@ -41,8 +42,8 @@ fn shadow(position: vec3f, normal: vec3f) -> f32 {
                 continue;
             }
             let stored = textureLoad(rsm_distance, texel, 0).x;
-            let own = receiver_distance(pixel_direction(scene_light_view, vec2u(texel), size), to_receiver, normal);
-            lit += select(0.0, 1.0, stored <= 0.0 || stored >= own * (1.0 - params.direct_bias));
+            let cosine = dot(normal, pixel_direction(scene_light_view, vec2u(texel), size));
+            lit += select(0.0, 1.0, stored <= 0.0 || stored * plane_reciprocal(cosine, height, own) >= 1.0 - params.direct_bias);
         }
     }
     return lit / f32(params.pcf * params.pcf);

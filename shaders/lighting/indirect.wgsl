@@ -9,7 +9,7 @@
 #import common::paraboloid::{basis, paraboloid_project, paraboloid_unproject, paraboloid_scale, atlas_origin}
 #import common::poisson::POISSON_16
 #import common::radiometry::{PI, disk_form_factor, luminance}
-#import common::shadow::receiver_distance
+#import common::shadow::plane_reciprocal
 
 struct Params {
     clusters: u32,
@@ -38,8 +38,9 @@ override shadow_plane: bool;
 struct Receiver {
     origin: vec2u, // of the light's map in the atlas
     texel: vec2f, // in the map
-    local: vec3f, // from the light, in the light's frame, not normalised
     normal: vec3f, // in the light's frame
+    own: f32, // distance from the light
+    height: f32, // offset from the light along the normal
 }
 
 // Ratio of the distance stored in a tap to the receiver's distance along the tap's ray; ≥ 1 − bias: not a blocker.
@@ -47,11 +48,11 @@ fn tap_ratio(r: Receiver, offset: vec2f) -> f32 {
     let size = f32(params.ism_size);
     let texel = floor(clamp(r.texel + offset, vec2f(0.0), vec2f(size - 1.0)));
     let stored = textureLoad(ism, r.origin + vec2u(texel), 0).x * scene_info.diagonal;
-    var own = length(r.local);
-    if shadow_plane {
-        own = receiver_distance(paraboloid_unproject((texel + 0.5) * (2.0 / size) - 1.0), r.local, r.normal);
+    if !shadow_plane {
+        return stored / r.own;
     }
-    return stored / own;
+    let ray = paraboloid_unproject((texel + 0.5) * (2.0 / size) - 1.0);
+    return stored * plane_reciprocal(dot(r.normal, ray), r.height, r.own);
 }
 
 // Visibility between the receiver and a disk light, 0 to 1. [ACRSM] 5.3.3, [PCSS]
@@ -63,7 +64,7 @@ fn visibility(r: Receiver, light_radius: f32) -> f32 {
     // Texels per angle at the receiver's place in the map: the unit disk is half of it.
     let disk = r.texel * (2.0 / f32(params.ism_size)) - 1.0;
     let texels_per_angle = paraboloid_scale(disk) * 0.5 * f32(params.ism_size);
-    let light_angle = light_radius / length(r.local);
+    let light_angle = light_radius / r.own;
     let search = clamp(params.pcss_search * light_angle * texels_per_angle, 1.0, params.pcss_limit);
     var blockers = 0.0;
     var sum = 0.0;
@@ -121,8 +122,9 @@ fn light(@builtin(global_invocation_id) id: vec3u) {
                 let frame = basis(cluster.normal);
                 let local = v * frame; // transpose × vector
                 var r: Receiver;
-                r.local = local;
                 r.normal = normal * frame;
+                r.own = sqrt(d2);
+                r.height = dot(r.normal, local);
                 r.texel = (0.5 + 0.5 * paraboloid_project(local * inverseSqrt(max(d2, 1e-30)))) * f32(params.ism_size);
                 r.origin = atlas_origin(c, params.ism_size, params.atlas_width / params.ism_size);
                 irradiance += e * visibility(r, sqrt(cluster.area / PI));

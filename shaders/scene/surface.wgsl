@@ -59,8 +59,8 @@ fn project(@builtin(vertex_index) index: u32) -> Corner {
 @fragment
 fn describe(in: Corner) -> Surface {
     let material = scene_materials[in.material];
-    // Derivatives need uniform control flow: sample first, then decide. OBJ's v runs upwards.
-    let texel = textureSample(scene_textures, linear_repeat_sampler, vec2f(in.uv.x, 1.0 - in.uv.y), min(material.diffuse_texture, textureNumLayers(scene_textures) - 1u));
+    // Derivatives need uniform control flow: sample first, then decide.
+    let texel = textureSample(scene_textures, linear_repeat_sampler, in.uv, min(material.diffuse_texture, textureNumLayers(scene_textures) - 1u));
 
     let to_viewer = view.origin - in.world;
     let distance = length(to_viewer);

@@ -7,7 +7,7 @@ use crate::support::{manylight, manylight_in, root};
 const SMALL: [&str; 4] = ["--size", "32x32", "--frames", "1"];
 
 /// A folder with a copy of `pipelines/` and `shaders/` to break.
-fn copy_of_library() -> tempfile::TempDir {
+pub fn copy_of_library() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for part in ["pipelines", "shaders", "assets"] {
         copy(&root().join(part), &folder.path().join(part));

@@ -2,4 +2,9 @@
 //! One binary, so that the workspace links once.
 
 mod cli;
+mod clustering;
+mod determinism;
+mod reference;
+mod renders;
 mod support;
+mod walkthrough;

@@ -1,29 +1,28 @@
 //! From a plan to a frame: pipelines, memory and bind groups, all under error scopes, beside the frame that runs.
 
-use std::{collections::BTreeMap, str::FromStr, sync::Arc};
+use std::str::FromStr;
 
 use manylight_graph::{
     diagnostics::Span,
-    plan::{Lifetime, Plan, PlanNode, PlanStep, ResourceIx, Target, Usage},
-    registry::Direction,
-    shader::{GlobalKind, Shader},
-    value::{Format, ResourceDesc},
+    plan::{Lifetime, Plan, PlanNode, PlanStep, Target},
+    value::ResourceDesc,
 };
 
 use crate::{
-    bind::{Finder, Groups, Own, StepLayout, placeholders, step_layout, view},
+    bind::{Finder, Own, placeholders},
     device::Gpu,
     error::{BuildError, Fault},
     externals::Externals,
-    format::{byte_size, texture_format},
-    frame::{Bindings, Dispatch, Draw, Frame, Host, MOST_TARGETS, Node, Pass, UsedExternal, check_external, entry_of},
-    host::{HostBytes, HostNodes},
+    frame::{Bindings, Frame, Node, Pass, check_external, entry_of},
+    host::HostNodes,
     limits::check_node,
     params,
-    pipeline_cache::{ComputeKey, Constants, PipelineCache, Refused, RenderKey},
+    pipeline_cache::LayoutKey,
     poison::{Poison, fills},
-    pool::{self, Memory},
+    pool,
+    steps::{Prepared, pass, prepare},
     timing::Timer,
+    uses::{host, host_bytes, host_outputs, is_output, usages, used_externals},
 };
 
 /// Switches of a build.
@@ -74,17 +73,6 @@ impl Builder<'_> {
     }
 }
 
-/// A step's pipeline with its layout, before memory is known.
-struct Prepared {
-    layout: StepLayout,
-    pipeline: Pipeline,
-}
-
-enum Pipeline {
-    Compute(wgpu::ComputePipeline),
-    Render(wgpu::RenderPipeline),
-}
-
 impl Frame {
     /// Binds a plan to the device. What the previous frame has and this one needs as well is taken over: pipelines, memory of
     /// equal shape, histories of equal name and description, and the state of host nodes. The previous frame is not touched:
@@ -97,6 +85,9 @@ impl Frame {
         previous: Option<&Frame>,
         options: BuildOptions,
     ) -> Result<(Frame, BuildReport), BuildError> {
+        if let Some(reason) = gpu.lost() {
+            return Err(Fault::Lost { reason }.into());
+        }
         let mut b = Builder { gpu, plan, faults: Vec::new() };
         let mut report = BuildReport::default();
         b.check(externals, hosts);
@@ -266,7 +257,7 @@ impl Builder<'_> {
         built.own.absent = placeholders(self.gpu, node, shader).map_err(|e| binding("placeholder".to_owned(), e))?;
         let finder = Finder { gpu: self.gpu, resources: &frame.resources, externals };
         let mut cleared = Vec::new();
-        let mut made: Vec<(Bound, [Groups; 2])> = Vec::new();
+        let mut made: Vec<(Bound, [crate::bind::Groups; 2])> = Vec::new();
         for (step, Prepared { layout, pipeline }) in node.steps.iter().zip(prepared) {
             let entry = || entry_of(Some(step));
             let mip = match step {
@@ -297,7 +288,7 @@ impl Builder<'_> {
 }
 
 /// Steps with the same layout, entry points and mip level bind the same groups.
-type Bound = (crate::pipeline_cache::LayoutKey, String, Option<(String, u32)>);
+type Bound = (LayoutKey, String, Option<(String, u32)>);
 
 fn missing(gpu: &Gpu, node: &PlanNode, feature: &str) -> Option<Fault> {
     let known = wgpu::Features::from_name(feature).or_else(|| wgpu::Features::from_str(feature).ok());
@@ -308,194 +299,4 @@ fn missing(gpu: &Gpu, node: &PlanNode, feature: &str) -> Option<Fault> {
         }
         Some(_) => None,
     }
-}
-
-fn prepare(
-    gpu: &Gpu,
-    cache: &mut PipelineCache,
-    plan: &Plan,
-    node: &PlanNode,
-    shader: &Arc<Shader>,
-    step: &PlanStep,
-) -> Result<Prepared, Fault> {
-    let entry = || entry_of(Some(step));
-    let binding = |message| Fault::Binding { node: node.id.clone(), entry: entry(), message };
-    let refused = |refused| match refused {
-        Refused::Module(message) => Fault::Module { node: node.id.clone(), shader: shader.source.name.clone(), message },
-        Refused::Pipeline(message) => {
-            Fault::Pipeline { node: node.id.clone(), entry: entry(), shader: shader.source.name.clone(), message }
-        }
-    };
-    let constants = Constants::new(&params::overrides(node, shader));
-    match step {
-        PlanStep::Compute { entry, .. } => {
-            let layout = step_layout(gpu, cache, plan, node, shader, &[entry]).map_err(binding)?;
-            let key = ComputeKey { shader: shader.hash, entry: entry.clone(), constants, layout: layout.key.clone() };
-            let pipeline = cache.compute(gpu, shader, &layout.pipeline, key).map_err(refused)?;
-            Ok(Prepared { layout, pipeline: Pipeline::Compute(pipeline) })
-        }
-        PlanStep::Draw { vertex, fragment, targets, depth, .. } => {
-            let layout = step_layout(gpu, cache, plan, node, shader, &[vertex, fragment]).map_err(binding)?;
-            let formats = color_formats(gpu, plan, targets).map_err(binding)?;
-            let key = RenderKey {
-                shader: shader.hash,
-                vertex: vertex.clone(),
-                fragment: fragment.clone(),
-                constants,
-                layout: layout.key.clone(),
-                targets: formats,
-                depth: depth.is_some(),
-            };
-            let pipeline = cache.render(gpu, shader, &layout.pipeline, key).map_err(refused)?;
-            Ok(Prepared { layout, pipeline: Pipeline::Render(pipeline) })
-        }
-    }
-}
-
-fn color_formats(gpu: &Gpu, plan: &Plan, targets: &[ResourceIx]) -> Result<Vec<wgpu::TextureFormat>, String> {
-    if targets.len() > MOST_TARGETS {
-        return Err(format!("it has more than {MOST_TARGETS} colour targets"));
-    }
-    let format_of = |ix: &ResourceIx| {
-        let resource = &plan.resources[*ix];
-        let name = &resource.name;
-        match resource.desc {
-            ResourceDesc::Texture { format: Format::Depth32Float, .. } => Err(format!("`{name}` is a depth texture and no colour target")),
-            ResourceDesc::Texture { format, .. } => {
-                let format = texture_format(format);
-                let usages = gpu.adapter().get_texture_format_features(format).allowed_usages;
-                if usages.contains(wgpu::TextureUsages::RENDER_ATTACHMENT) {
-                    Ok(format)
-                } else {
-                    Err(format!("this GPU cannot draw to the format {format:?} of `{name}`"))
-                }
-            }
-            _ => Err(format!("`{name}` is a buffer and no colour target")),
-        }
-    };
-    targets.iter().map(format_of).collect()
-}
-
-/// A pass of one step; `cleared` tells which targets an earlier draw of the node has already cleared.
-fn pass(
-    finder: Finder<'_>,
-    step: &PlanStep,
-    pipeline: Pipeline,
-    bindings: Bindings,
-    cleared: &mut Vec<ResourceIx>,
-) -> Result<Pass, String> {
-    match (step, pipeline) {
-        (PlanStep::Compute { groups, .. }, Pipeline::Compute(pipeline)) => {
-            Ok(Pass::Compute(vec![Dispatch { pipeline, bindings, groups: *groups }]))
-        }
-        (PlanStep::Draw { vertices, targets, depth, .. }, Pipeline::Render(pipeline)) => {
-            let mut attach = |ix: ResourceIx| {
-                let of = |parity| match finder.memory(Target::Resource(ix), parity)? {
-                    Memory::Texture(texture) => Ok(view(texture, false, Some(0))),
-                    Memory::Buffer(_) => Err("a buffer is no render target".to_owned()),
-                };
-                let clear = !cleared.contains(&ix);
-                cleared.push(ix);
-                Ok::<_, String>(([of(0)?, of(1)?], clear))
-            };
-            let targets = targets.iter().map(|ix| attach(*ix));
-            let targets = targets.collect::<Result<_, _>>()?;
-            let depth = depth.map(attach).transpose()?;
-            Ok(Pass::Draw(Draw { pipeline, bindings, vertices: *vertices, targets, depth }))
-        }
-        _ => Err("the pipeline does not fit the step".to_owned()),
-    }
-}
-
-fn is_output(node: &PlanNode, port: &str) -> bool {
-    node.decl.ports.get(port).is_some_and(|p| p.direction == Direction::Output)
-}
-
-/// Which resources a host node writes.
-fn host_outputs(plan: &Plan) -> Vec<bool> {
-    let mut all = vec![false; plan.resources.len()];
-    for node in plan.nodes.iter().filter(|n| n.decl.shader.is_none()) {
-        for (port, target) in &node.bindings {
-            if let Target::Resource(ix) = *target
-                && is_output(node, port)
-            {
-                all[ix] = true;
-            }
-        }
-    }
-    all
-}
-
-fn host_bytes(plan: &Plan, host_outputs: &[bool]) -> BTreeMap<ResourceIx, HostBytes> {
-    let mut all = BTreeMap::new();
-    for (ix, r) in plan.resources.iter().enumerate() {
-        if let ResourceDesc::Buffer { stride, count, .. } = r.desc
-            && host_outputs[ix]
-        {
-            let bytes = (u64::from(stride) * count).min(byte_size(&r.desc)) as usize;
-            all.insert(ix, HostBytes { bytes: vec![0; bytes], stride, stamp: 0 });
-        }
-    }
-    all
-}
-
-fn host(plan: &Plan, hosts: &HostNodes, previous: Option<&Frame>, node: &PlanNode) -> Option<Host> {
-    let kept = previous.and_then(|f| {
-        let at = f.plan.nodes.iter().position(|n| n.id == node.id && n.decl.name == node.decl.name)?;
-        Some(f.nodes[at].host.as_ref()?.node.clone())
-    });
-    let make = || {
-        let kind = hosts.find(&node.decl.name)?;
-        Some(Arc::new(std::sync::Mutex::new((kind.make)())))
-    };
-    let mut host = Host { node: kept.or_else(make)?, outputs: Vec::new(), externals: Vec::new(), inputs: Vec::new(), ran_with: None };
-    for (port, target) in &node.bindings {
-        match *target {
-            Target::Resource(ix) if is_output(node, port) => host.outputs.push(ix),
-            Target::Resource(ix) | Target::Previous(ix) => {
-                let r = &plan.resources[ix];
-                if r.lifetime == Lifetime::External {
-                    host.externals.push(r.name.clone());
-                } else {
-                    host.inputs.push(ix);
-                }
-            }
-            Target::Absent => {}
-        }
-    }
-    Some(host)
-}
-
-fn used_externals(plan: &Plan, externals: &Externals) -> Vec<UsedExternal> {
-    let of = |(resource, r): (usize, &manylight_graph::plan::PlanResource)| {
-        let bound = externals.memory(&r.name)?.clone();
-        (r.lifetime == Lifetime::External).then_some(UsedExternal { resource, bound })
-    };
-    plan.resources.iter().enumerate().filter_map(of).collect()
-}
-
-/// Usages over all nodes: what the plan says, and what the shaders declare.
-fn usages(plan: &Plan) -> Vec<Usage> {
-    let mut all: Vec<Usage> = plan.resources.iter().map(|r| r.usage).collect();
-    for node in &plan.nodes {
-        for step in &node.steps {
-            if let PlanStep::Draw { targets, depth, .. } = step {
-                for &ix in targets.iter().chain(depth) {
-                    all[ix].target = true;
-                }
-            }
-        }
-        let Some(shader) = &node.decl.shader else {
-            continue;
-        };
-        for global in &shader.globals {
-            let port = node.bindings.iter().find(|(port, _)| *port == global.name);
-            if let Some((_, Target::Resource(ix) | Target::Previous(ix))) = port
-                && matches!(global.kind, GlobalKind::StorageTexture { .. })
-            {
-                all[*ix].storage = true;
-            }
-        }
-    }
-    all
 }

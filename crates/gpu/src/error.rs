@@ -87,6 +87,8 @@ pub enum Fault {
     UnknownHost { node: String, kind: String },
     #[error("host node `{node}`, port `{port}`: {message}")]
     HostPort { node: String, port: String, message: String },
+    #[error("the GPU device was lost: {reason}")]
+    Lost { reason: String },
     #[error("the frame cannot be recorded: {message}")]
     Recording { message: String },
 }

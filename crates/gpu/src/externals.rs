@@ -38,7 +38,7 @@ pub struct TextureArray<'a> {
     pub height: u32,
     /// Mip levels that every layer has.
     pub mips: u32,
-    /// The layers: all mip levels one after another, rows tightly packed. Without layers, one zeroed texel stands in.
+    /// The layers: all mip levels one after another, rows tightly packed. Without layers, one zeroed layer stands in.
     pub layers: &'a [&'a [u8]],
 }
 

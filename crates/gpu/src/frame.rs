@@ -17,11 +17,9 @@ use crate::{
     host::{HostBytes, HostContext, HostData, SharedHost},
     poison::{Fill, Poison},
     pool::{Memory, Place, Resource},
+    record::{compute, draw},
     timing::{FrameTimings, Timer},
 };
-
-/// Colour targets that WebGPU allows at most.
-pub(crate) const MOST_TARGETS: usize = 8;
 
 /// A plan bound to a device: pipelines, bind groups, memory and timers.
 pub struct Frame {
@@ -47,7 +45,7 @@ pub(crate) struct Node {
 
 pub(crate) enum Pass {
     Compute(Vec<Dispatch>),
-    Draw(Draw),
+    Draw(Box<Draw>),
 }
 
 /// Bind groups of a step for frames of even and odd index.
@@ -140,6 +138,7 @@ impl Frame {
         if let Some(reason) = gpu.lost() {
             return Err(RunError::Lost(reason));
         }
+        let _span = tracing::info_span!("frame", index = self.index).entered();
         let errors_before = gpu.error_count();
         let start = Instant::now();
         self.follow_externals(gpu, externals)?;
@@ -328,69 +327,4 @@ fn dependencies(host: &Host, externals: &Externals, bytes: &BTreeMap<ResourceIx,
 
 fn nanoseconds(since: Instant) -> u64 {
     u64::try_from(since.elapsed().as_nanos()).unwrap_or(u64::MAX)
-}
-
-type Stamps<'a> = Option<(&'a wgpu::QuerySet, Option<u32>, Option<u32>)>;
-
-fn compute(encoder: &mut wgpu::CommandEncoder, label: &str, steps: &[Dispatch], parity: usize, stamps: Stamps<'_>) {
-    let timestamp_writes = stamps.map(|(query_set, begin, end)| wgpu::ComputePassTimestampWrites {
-        query_set,
-        beginning_of_pass_write_index: begin,
-        end_of_pass_write_index: end,
-    });
-    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes });
-    let mut before: Option<&Dispatch> = None;
-    for step in steps {
-        if before.is_none_or(|b| b.pipeline != step.pipeline) {
-            pass.set_pipeline(&step.pipeline);
-        }
-        let groups = &step.bindings.groups[parity];
-        // Steps that share a layout and are repeated share their bind groups.
-        if before.is_none_or(|b| b.bindings.groups[parity] != *groups) {
-            for (index, group) in groups {
-                pass.set_bind_group(*index, group, &[]);
-            }
-        }
-        let [x, y, z] = step.groups;
-        pass.dispatch_workgroups(x, y, z);
-        before = Some(step);
-    }
-}
-
-fn draw(encoder: &mut wgpu::CommandEncoder, label: &str, step: &Draw, parity: usize, stamps: Stamps<'_>) {
-    let mut colors = [const { None }; MOST_TARGETS];
-    for (slot, (views, clear)) in colors.iter_mut().zip(&step.targets) {
-        let load = if *clear { wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { wgpu::LoadOp::Load };
-        *slot = Some(wgpu::RenderPassColorAttachment {
-            view: &views[parity],
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
-        });
-    }
-    let depth = step.depth.as_ref().map(|(views, clear)| {
-        let load = if *clear { wgpu::LoadOp::Clear(0.0) } else { wgpu::LoadOp::Load };
-        wgpu::RenderPassDepthStencilAttachment {
-            view: &views[parity],
-            depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
-            stencil_ops: None,
-        }
-    });
-    let timestamp_writes = stamps.map(|(query_set, begin, end)| wgpu::RenderPassTimestampWrites {
-        query_set,
-        beginning_of_pass_write_index: begin,
-        end_of_pass_write_index: end,
-    });
-    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some(label),
-        color_attachments: &colors[..step.targets.len()],
-        depth_stencil_attachment: depth,
-        timestamp_writes,
-        ..Default::default()
-    });
-    pass.set_pipeline(&step.pipeline);
-    for (index, group) in &step.bindings.groups[parity] {
-        pass.set_bind_group(*index, group, &[]);
-    }
-    pass.draw(0..step.vertices, 0..1);
 }

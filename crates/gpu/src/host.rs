@@ -9,6 +9,7 @@ use std::{
 
 use manylight_graph::{
     plan::{PlanNode, ResourceIx, Target},
+    registry::HostDecl,
     value::Value,
 };
 
@@ -65,6 +66,11 @@ impl HostNodes {
     /// All kinds, in the order in which they were added.
     pub fn kinds(&self) -> &[HostKind] {
         &self.kinds
+    }
+
+    /// What the registry must know of them.
+    pub fn declarations(&self) -> Vec<HostDecl> {
+        self.kinds.iter().map(|k| HostDecl { name: k.name, ron: k.declaration }).collect()
     }
 
     pub(crate) fn find(&self, name: &str) -> Option<&HostKind> {

@@ -45,10 +45,14 @@ pub mod readback;
 pub mod timing;
 pub mod watch;
 
+mod adapter;
 mod bind;
 mod params;
 mod pipeline_cache;
 mod poison;
+mod record;
+mod steps;
+mod uses;
 
 pub use build::{BuildOptions, BuildReport};
 pub use device::{Gpu, GpuKind, GpuOptions};

@@ -8,7 +8,7 @@ use manylight_graph::{
 use crate::{
     device::Gpu,
     error::Fault,
-    format::{buffer_bytes, byte_size, describe, texture_format},
+    format::{buffer_bytes, byte_size, describe, mip_size, texture_format},
     limits::check_resource,
 };
 
@@ -53,8 +53,11 @@ impl Shape {
             ResourceDesc::Texture { format, width, height, layers, mips, .. } => Some((format, width, height, layers, mips)),
             _ => None,
         };
-        // Buffers have all usages at once.
-        let usage = if texture.is_some() { usage } else { Usage::default() };
+        // Buffers have all usages at once, and every texture can be read.
+        let usage = match texture {
+            Some((format, ..)) => Usage { read: true, storage: usage.storage, target: usage.target || format == Format::Depth32Float },
+            None => Usage::default(),
+        };
         Self { texture, bytes: byte_size(desc), usage }
     }
 }
@@ -206,15 +209,23 @@ impl<'a> State<'a> {
 
     fn history(&self, name: &str, desc: &ResourceDesc, shape: Shape, out: &mut Allocated) -> Result<Place, Fault> {
         let old = self.previous.iter().find(|r| r.name == name && r.desc == *desc);
-        if let Some(Place::History(copies)) = old.map(|r| &r.place)
-            && copies[0].shape == shape
-        {
-            out.history_kept.push(name.to_owned());
+        let Some(Place::History(copies)) = old.map(|r| &r.place) else {
+            out.history_reset.push(name.to_owned());
+            let zeroed = || make(self.gpu, name, desc, shape);
+            return Ok(Place::History([zeroed()?, zeroed()?]));
+        };
+        out.history_kept.push(name.to_owned());
+        if copies[0].shape == shape {
             return Ok(Place::History(copies.clone()));
         }
-        out.history_reset.push(name.to_owned());
-        let copy = || make(self.gpu, name, desc, shape);
-        Ok(Place::History([copy()?, copy()?]))
+        // Same name and description, but a new producer writes it in another way: the contents move to new memory.
+        let moved = |from: &Allocation| {
+            let to = make(self.gpu, name, desc, shape)?;
+            copy(self.gpu, &from.memory, &to.memory)
+                .map_err(|message| Fault::Resource { resource: format!("resource `{name}` ({})", describe(desc)), message })?;
+            Ok::<_, Fault>(to)
+        };
+        Ok(Place::History([moved(&copies[0])?, moved(&copies[1])?]))
     }
 
     fn transient(&mut self, name: &str, desc: &ResourceDesc, slot: usize) -> Result<Allocation, Fault> {
@@ -267,6 +278,24 @@ fn make(gpu: &Gpu, label: &str, desc: &ResourceDesc, shape: Shape) -> Result<All
     });
     let memory = made.map_err(|message| Fault::Resource { resource: format!("resource `{label}` ({})", describe(desc)), message })?;
     Ok(Allocation { shape, memory })
+}
+
+/// Copies a texture with all levels and layers into another of the same shape.
+fn copy(gpu: &Gpu, from: &Memory, to: &Memory) -> Result<(), String> {
+    let (Memory::Texture(from), Memory::Texture(to)) = (from, to) else {
+        return Ok(());
+    };
+    gpu.scoped(|| {
+        let mut encoder = gpu.device().create_command_encoder(&Default::default());
+        for mip_level in 0..from.mip_level_count() {
+            let (width, height) = mip_size(from.width(), from.height(), mip_level);
+            let size = wgpu::Extent3d { width, height, depth_or_array_layers: from.depth_or_array_layers() };
+            let level =
+                |texture| wgpu::TexelCopyTextureInfo { texture, mip_level, origin: wgpu::Origin3d::ZERO, aspect: wgpu::TextureAspect::All };
+            encoder.copy_texture_to_texture(level(from), level(to), size);
+        }
+        gpu.queue().submit([encoder.finish()]);
+    })
 }
 
 fn texture_usages(format: Format, usage: Usage) -> wgpu::TextureUsages {

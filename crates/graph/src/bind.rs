@@ -7,7 +7,7 @@ use crate::{
     diagnostics::{Diagnostic, Source, Span},
     reflect::{self, NEAREST_SAMPLER},
     registry::{Direction, Over, Param, Port, PortKind, Repeat, Step},
-    render::suggest,
+    render::{and_also, suggest},
     shader::{Access, Entry, Global, GlobalKind, MemberKind, SampleKind, Scalar, Shader, Stage},
     value::{Format, ParamKind},
     wgsl::{self, Scan},
@@ -22,12 +22,14 @@ struct Binder<'a> {
     decl: &'a Declaration,
     shader: &'a Shader,
     scan: &'a Scan,
+    /// A draw has another number of targets than its shader: which output is unused cannot be told.
+    unsettled: bool,
     out: &'a mut Vec<Diagnostic>,
 }
 
 /// Reports everything in which the shader and the declaration disagree.
 pub(crate) fn bind(decl: &Declaration, shader: &Shader, scan: &Scan, out: &mut Vec<Diagnostic>) {
-    let mut binder = Binder { decl, shader, scan, out };
+    let mut binder = Binder { decl, shader, scan, unsettled: false, out };
     let reached = binder.steps();
     binder.globals();
     binder.ports(&reached);
@@ -96,7 +98,12 @@ impl<'a> Binder<'a> {
     }
 
     fn entry(&mut self, name: &str, stage: Stage, span: &Span) -> Option<Entry> {
-        let place = within(span, &format!("\"{name}\""));
+        let field = match stage {
+            Stage::Compute => "entry",
+            Stage::Vertex => "vertex",
+            Stage::Fragment => "fragment",
+        };
+        let place = within_field(span, field, &format!("\"{name}\""));
         let word = |s: Stage| match s {
             Stage::Compute => "compute",
             Stage::Vertex => "vertex",
@@ -133,6 +140,7 @@ impl<'a> Binder<'a> {
             .unwrap_or_default();
         let there = self.item_span("fn", &entry.name);
         if kinds.len() != targets.len() {
+            self.unsettled = true;
             self.out.push(
                 Diagnostic::error(format!("the step has {} targets, and `{}` writes {} locations", targets.len(), entry.name, kinds.len()), within(span, "targets"))
                     .and(there, "declared here")
@@ -183,7 +191,7 @@ impl<'a> Binder<'a> {
                 self.out.push(
                     Diagnostic::error(format!("`{name}` is no port of this node"), self.global_span(global))
                         .and(self.decl.span.clone(), "the node's declaration")
-                        .help(format!("{help} Globals are bound by name: ports, `params`, and the samplers {}", SAMPLERS.join(", "))),
+                        .help(and_also(help, &format!("Globals are bound by name: ports, `params`, and the samplers {}", SAMPLERS.join(", ")))),
                 );
             }
         }
@@ -239,6 +247,9 @@ impl<'a> Binder<'a> {
                 // A misspelt global is already reported with this port as the suggestion.
                 let candidates = self.shader.globals.iter().filter(|g| !self.known_global(&g.name)).map(|g| g.name.as_str());
                 if crate::render::nearest(name, candidates).is_some() {
+                    continue;
+                }
+                if self.unsettled && port.direction == Direction::Output {
                     continue;
                 }
                 let help = expected_wgsl(name, port, false);
@@ -453,6 +464,16 @@ fn step_params(step: &Step, found: &mut BTreeSet<String>) {
             }
         }
         Step::Draw { vertices, .. } => walk(vertices, found),
+    }
+}
+
+/// The place of `what` after the field `field` inside a span, or the span.
+fn within_field(span: &Span, field: &str, what: &str) -> Span {
+    let text = span.text();
+    let from = text.find(&format!("{field}:")).unwrap_or(0);
+    match text[from..].find(what) {
+        Some(at) => Span::new(&span.source, span.range.start + from + at..span.range.start + from + at + what.len()),
+        None => span.clone(),
     }
 }
 

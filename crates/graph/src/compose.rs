@@ -14,7 +14,7 @@ use naga_oil::compose::{ComposableModuleDescriptor, Composer, ComposerError, Com
 use crate::{
     diagnostics::{Diagnostic, Source, Span},
     reflect::demangle,
-    render::suggest,
+    render::{and_also, suggest},
     wgsl::{self, Scan},
 };
 
@@ -122,6 +122,9 @@ impl Composition {
     fn direct_imports(&self, source: &Arc<Source>, scan: &Scan, out: &mut Vec<Diagnostic>) -> BTreeSet<String> {
         let mut found = BTreeSet::new();
         let mut named: BTreeSet<&str> = BTreeSet::new();
+        if let Some(range) = &scan.unclosed {
+            out.push(Diagnostic::error("the import's `{` is never closed", Span::new(source, range.clone())).help("add the missing `}`"));
+        }
         for path in &scan.paths {
             if !path.import {
                 continue;
@@ -145,7 +148,7 @@ impl Composition {
                         let help = suggest(module, self.modules.keys().map(String::as_str));
                         out.push(
                             Diagnostic::error(format!("there is no module `{module}`"), span)
-                                .help(format!("{help} A file `shaders/common/x.wgsl` is the module `common::x`")),
+                                .help(and_also(help, "A file `shaders/common/x.wgsl` is the module `common::x`")),
                         );
                     }
                 }
@@ -301,7 +304,7 @@ impl Composition {
         let at = |position: usize| Span::new(file, { let p = wgsl::original_offset(&file.text, &replaced, position); p..p });
         match &error.inner {
             ComposerErrorInner::WgslParseError(e) => {
-                let labels = e.labels().map(|(span, text)| (span.to_range().unwrap_or(0..0), text.to_owned())).collect();
+                let labels = e.labels().filter_map(|(span, text)| Some((span.to_range()?, text.to_owned()))).collect();
                 self.labelled(self.undecorate(e.message()), labels, &place, file)
             }
             ComposerErrorInner::HeaderValidationError(e) | ComposerErrorInner::ShaderValidationError(e) => {
@@ -349,10 +352,15 @@ impl Composition {
         match labels.next() {
             None => Diagnostic::error(message, Span::new(file, 0..0)),
             Some((range, text)) => {
-                let first = Diagnostic::error(message, place(range)).at(self.undecorate(&text));
-                labels.fold(first, |fault, (range, text)| fault.and(place(range), self.undecorate(&text)))
+                let first = Diagnostic::error(message, place(range)).at(self.label(&text));
+                labels.fold(first, |fault, (range, text)| fault.and(place(range), self.label(&text)))
             }
         }
+    }
+
+    /// A label in the user's words: indices into naga's tables say nothing.
+    fn label(&self, text: &str) -> String {
+        if text.starts_with("naga::") { String::new() } else { self.undecorate(text) }
     }
 
     /// Takes naga_oil's marks out of a message.
@@ -373,14 +381,29 @@ fn module_needs(module: &Module) -> BTreeSet<String> {
     module.imports.clone()
 }
 
-/// An error and its causes, from the outside in.
+/// An error and its causes, from the outside in. Those that only number an item that the labels show are left out.
 fn chain(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut at = error.source();
+    let mut parts = Vec::new();
+    let mut at = Some(error);
     while let Some(cause) = at {
-        text.push_str(": ");
-        text.push_str(&cause.to_string());
+        parts.push(cause.to_string());
         at = cause.source();
+    }
+    let last = parts.len().saturating_sub(1);
+    let numbered = |text: &str| text.ends_with(" is invalid") && ["Expression [", "Function [", "Entry point ", "Call to ["].iter().any(|s| text.starts_with(s));
+    let kept: Vec<String> = parts.into_iter().enumerate().filter(|(i, text)| *i == last || !numbered(text)).map(|(_, text)| text).collect();
+    wgsl_types(&kept.join(": "))
+}
+
+/// naga's spelling of types as WGSL has it.
+fn wgsl_types(text: &str) -> String {
+    let mut text = text.to_owned();
+    for (kind, width, scalar, letter) in [("Float", 4, "f32", "f"), ("Uint", 4, "u32", "u"), ("Sint", 4, "i32", "i"), ("Bool", 1, "bool", "<bool>")] {
+        let inner = format!("Scalar {{ kind: {kind}, width: {width} }}");
+        text = text.replace(&format!("Scalar({inner})"), scalar);
+        for (size, n) in [("Bi", 2), ("Tri", 3), ("Quad", 4)] {
+            text = text.replace(&format!("Vector {{ size: {size}, scalar: {inner} }}"), &format!("vec{n}{letter}"));
+        }
     }
     text
 }

@@ -1,6 +1,6 @@
 //! Reads a node's declaration: `Node(doc, inputs, outputs, params, requires, steps)`.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use indexmap::IndexMap;
 
@@ -12,7 +12,7 @@ use crate::{
     reader::{Reader, Shape, Spanned, head},
     registry::{Direction, Expr, NodeDecl, Over, Param, Port, PortKind, Repeat, Step},
     render::suggest,
-    tree::{Kind, Tree},
+    tree::{Kind, Tree, keys},
 };
 
 /// A declaration without its shader.
@@ -54,22 +54,15 @@ fn read_node(reader: &mut Reader, tree: &Tree, host: bool) -> Option<Declaration
     let fields = reader.record(tree, &NODE)?;
     let doc = fields.get("doc").and_then(|t| reader.text(t, "a sentence in quotes")).map(|d| d.text).unwrap_or_default();
     let mut ports = IndexMap::new();
+    let mut declared = BTreeSet::new();
     for (field, direction) in [("inputs", Direction::Input), ("outputs", Direction::Output)] {
         if let Some(tree) = fields.get(field) {
+            declared.extend(keys(tree));
             read_ports(reader, tree, direction, &mut ports);
         }
     }
+    declared.extend(fields.get("params").map(keys).unwrap_or_default());
     let params = fields.get("params").map(|t| read_params(reader, t)).unwrap_or_default();
-    for (name, param) in &params {
-        if let Some(port) = ports.get(name) {
-            let port: &Port = port;
-            reader.out.push(
-                Diagnostic::error(format!("`{name}` is both a port and a parameter"), param.span.clone())
-                    .and(port.span.clone(), "the port")
-                    .help("rename one of them: shaders are bound by name"),
-            );
-        }
-    }
     let mut requires = Vec::new();
     if let Some(tree) = fields.get("requires") {
         for item in reader.list(tree, "device features") {
@@ -85,10 +78,10 @@ fn read_node(reader: &mut Reader, tree: &Tree, host: bool) -> Option<Declaration
                 reader.error(&tree.range, "a node without steps does nothing", "add `(entry: \"…\", over: …)`");
             }
             for item in items {
-                steps.extend(read_step(reader, item, &ports, &params));
+                steps.extend(read_step(reader, item, &Names { ports: &ports, params: &params, declared: &declared }));
             }
         }
-        None if host => {}
+        None if host || fields.tried("steps") => {}
         None => reader.error(&head(tree), "missing field `steps` in Node", "add `steps: [(entry: \"…\", over: …)]`"),
     }
     Some(Declaration { doc, ports, params, steps, requires, span: reader.span(&head(tree)) })
@@ -164,10 +157,11 @@ const DRAW: Shape = Shape { what: "Draw", required: &["vertex", "fragment", "ver
 struct Names<'a> {
     ports: &'a IndexMap<String, Port>,
     params: &'a IndexMap<String, Param>,
+    /// All names of ports and parameters, those with faults too.
+    declared: &'a BTreeSet<String>,
 }
 
-fn read_step(reader: &mut Reader, tree: &Tree, ports: &IndexMap<String, Port>, params: &IndexMap<String, Param>) -> Option<Step> {
-    let names = Names { ports, params };
+fn read_step(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Step> {
     let name = match &tree.kind {
         Kind::Record(name, _) | Kind::Tuple(name, _) => name.as_ref(),
         _ => {
@@ -180,9 +174,9 @@ fn read_step(reader: &mut Reader, tree: &Tree, ports: &IndexMap<String, Port>, p
         None => {
             let fields = reader.record(tree, &STEP)?;
             let entry = fields.get("entry").and_then(|t| reader.text(t, "the name of an entry point in quotes"));
-            let over = fields.get("over").and_then(|t| read_over(reader, t, &names));
+            let over = fields.get("over").and_then(|t| read_over(reader, t, names));
             let repeat = match fields.get("repeat") {
-                Some(tree) => Some(read_repeat(reader, tree, &names)?),
+                Some(tree) => Some(read_repeat(reader, tree, names)?),
                 None => None,
             };
             Some(Step::Compute { entry: entry?.text, over: over?, repeat, span })
@@ -191,15 +185,15 @@ fn read_step(reader: &mut Reader, tree: &Tree, ports: &IndexMap<String, Port>, p
             let fields = reader.record(tree, &DRAW)?;
             let vertex = fields.get("vertex").and_then(|t| reader.text(t, "the name of an entry point in quotes"));
             let fragment = fields.get("fragment").and_then(|t| reader.text(t, "the name of an entry point in quotes"));
-            let vertices = fields.get("vertices").and_then(|t| read_expr(reader, t, &names));
+            let vertices = fields.get("vertices").and_then(|t| read_expr(reader, t, names));
             let mut targets = Vec::new();
             if let Some(tree) = fields.get("targets") {
                 for item in reader.list(tree, "output ports") {
-                    targets.extend(target(reader, item, &names, false));
+                    targets.extend(target(reader, item, names, false));
                 }
             }
             let depth = match fields.get("depth") {
-                Some(tree) => Some(target(reader, tree, &names, true)?),
+                Some(tree) => Some(target(reader, tree, names, true)?),
                 None => None,
             };
             Some(Step::Draw { vertex: vertex?.text, fragment: fragment?.text, vertices: vertices?, targets, depth, span })
@@ -241,7 +235,7 @@ fn target(reader: &mut Reader, tree: &Tree, names: &Names<'_>, depth: bool) -> O
 
 fn find_port<'a>(reader: &mut Reader, name: &Spanned, names: &Names<'a>) -> Option<&'a Port> {
     let port = names.ports.get(&name.text);
-    if port.is_none() {
+    if port.is_none() && !names.declared.contains(&name.text) {
         reader.out.push(
             Diagnostic::error(format!("this node has no port `{}`", name.text), name.span.clone())
                 .help(suggest(&name.text, names.ports.keys().map(String::as_str))),
@@ -282,6 +276,7 @@ fn read_expr(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Expr
                     );
                     false
                 }
+                None if names.declared.contains(&r.name.text) => false,
                 None => {
                     reader.out.push(
                         Diagnostic::error(format!("this node has no parameter `{}`", r.name.text), r.name.span.clone())

@@ -10,11 +10,11 @@ use crate::{
     diagnostics::{Diagnostic, Source, Span},
     expr, format,
     params::{Literal, check_identifier, read_literal, read_params},
-    pipeline::{Argument, ArgumentValue, Connection, Mips, NodeUse, Preset, Resource, ResourceKind, Size},
+    pipeline::{Argument, ArgumentValue, Connection, Gaps, Mips, NodeUse, Preset, Resource, ResourceKind, Size},
     reader::{Reader, Shape, Spanned, head},
     registry::Param,
     render::suggest,
-    tree::{Kind, Tree},
+    tree::{Kind, Tree, keys},
     value::Encoding,
 };
 
@@ -32,6 +32,7 @@ pub(crate) struct Document {
     pub nodes: Vec<NodeUse>,
     pub presents: Option<Spanned>,
     pub radiance: Option<Spanned>,
+    pub gaps: Gaps,
 }
 
 const PIPELINE: Shape = Shape {
@@ -78,24 +79,36 @@ fn read_document(reader: &mut Reader, tree: &Tree, stage: &str) -> Option<Docume
         }
     }
     let params = fields.get("params").map(|t| read_params(reader, t)).unwrap_or_default();
+    let mut gaps = Gaps::default();
+    gaps.params = fields.get("params").map(keys).unwrap_or_default().into_iter().filter(|name| !params.contains_key(name)).collect();
     let mut resources = IndexMap::new();
     if let Some(tree) = fields.get("resources") {
         for (name, tree) in reader.map(tree, "resources") {
-            check_identifier(reader, &name, "resource");
+            // Whoever names it has another name in mind.
+            gaps.files |= !check_identifier(reader, &name, "resource");
             if let Some(resource) = read_resource(reader, &name, tree) {
                 resources.insert(name.text, resource);
+            } else {
+                gaps.resources.insert(name.text);
             }
         }
     }
     let mut nodes = Vec::new();
     if let Some(tree) = fields.get("nodes") {
         for item in reader.list(tree, "nodes") {
-            nodes.extend(read_node(reader, item, stage));
+            match read_node(reader, item, stage) {
+                Some(node) => nodes.push(node),
+                None => gaps.nodes = true,
+            }
         }
     }
-    let presents = text(reader, "presents", "the name of a resource in quotes");
+    let mut presents = text(reader, "presents", "the name of a resource in quotes");
+    if presents.is_none() && fields.tried("presents") {
+        // Reported already; it is not missing.
+        presents = Some(Spanned { text: String::new(), span: reader.span(&head(tree)) });
+    }
     let radiance = text(reader, "radiance", "the name of a resource in quotes");
-    Some(Document { doc, is_stage, head: reader.span(&head(tree)), extends, include, set, params, resources, nodes, presents, radiance })
+    Some(Document { doc, is_stage, head: reader.span(&head(tree)), extends, include, set, params, resources, nodes, presents, radiance, gaps })
 }
 
 const TEXTURE: Shape = Shape { what: "Texture", required: &["format", "size"], optional: &["mips", "encoding", "history", "doc"] };
@@ -217,6 +230,7 @@ fn read_node(reader: &mut Reader, tree: &Tree, stage: &str) -> Option<NodeUse> {
         reader.expected(tree, "a node", "write `(id: \"…\", node: \"stage/name\", in: {…}, out: {…})`");
         return None;
     }
+    let before = reader.out.len();
     let fields = reader.record(tree, &NODE)?;
     let id = fields.get("id").and_then(|t| reader.text(t, "a name in quotes"));
     if let Some(id) = &id {
@@ -246,7 +260,8 @@ fn read_node(reader: &mut Reader, tree: &Tree, stage: &str) -> Option<NodeUse> {
         }
     }
     let when = fields.get("when").and_then(|t| condition::read(reader, t));
-    Some(NodeUse { id: id?, node: node?, inputs, outputs, params, when, stage: stage.to_owned() })
+    let broken = reader.out.len() > before;
+    Some(NodeUse { id: id?, node: node?, inputs, outputs, params, when, stage: stage.to_owned(), broken })
 }
 
 fn read_connections(reader: &mut Reader, tree: &Tree, input: bool, found: &mut IndexMap<String, Connection>) {

@@ -148,7 +148,8 @@ impl Library {
     /// The help for a document that is not there.
     pub(crate) fn suggest_document(&self, name: &str) -> String {
         let known = self.list("pipelines", "ron");
-        suggest(name, known.iter().filter_map(|k| k.strip_prefix("pipelines/")))
+        let known = known.iter().filter_map(|k| k.strip_prefix("pipelines/"));
+        if name.ends_with(".ron") { suggest(name, known) } else { suggest(name, known.map(|k| k.trim_end_matches(".ron"))) }
     }
 
     /// The library's path of a file on disk, if it lies under the root.

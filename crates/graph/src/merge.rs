@@ -1,20 +1,17 @@
 //! Loads a pipeline with all it extends and includes, and merges the files.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    path::Path,
-    sync::Arc,
-};
+use std::{collections::BTreeSet, path::Path, sync::Arc};
 
 use indexmap::{IndexMap, map::Entry};
 
 use crate::{
-    diagnostics::{Diagnostic, Diagnostics, Severity, Source, Span},
+    diagnostics::{Diagnostic, Diagnostics, Source, Span},
     document::{self, Document},
-    library::{Library, stem},
-    pipeline::{NodeUse, Pipeline, Preset, Resource},
+    library::{Library, ReadError, stem},
+    pipeline::{Gaps, NodeUse, Pipeline, Preset, Resource},
     reader::Spanned,
     registry::Param,
+    render::and_also,
 };
 
 impl Pipeline {
@@ -23,22 +20,33 @@ impl Pipeline {
     /// # Errors
     /// All faults of all files that it reads.
     pub fn load(library: &Library, path: impl AsRef<Path>) -> Result<Self, Diagnostics> {
-        let path = path.as_ref();
-        let (source, library_path) = library.find(path).map_err(|error| {
-            let fault = error.diagnostic();
-            Diagnostics::from(match error {
-                crate::library::ReadError::Missing(name) => fault.help(library.suggest_document(&name)),
-                crate::library::ReadError::Unreadable { .. } => fault,
-            })
-        })?;
-        let mut loader = Loader { library, out: Vec::new(), sources: Vec::new(), stack: Vec::new(), parsed: BTreeMap::new() };
+        match Self::load_with_gaps(library, path.as_ref()) {
+            (Some(pipeline), faults) if !faults.has_errors() => Ok(pipeline),
+            (_, faults) => Err(faults),
+        }
+    }
+
+    /// As [`load`](Self::load), but what can be read of a pipeline with faults is returned, too.
+    pub(crate) fn load_with_gaps(library: &Library, path: &Path) -> (Option<Self>, Diagnostics) {
+        let (source, library_path) = match library.find(path) {
+            Ok(found) => found,
+            Err(error) => {
+                let fault = error.diagnostic();
+                let fault = match error {
+                    ReadError::Missing(name) => fault.help(library.suggest_document(&name)),
+                    ReadError::Unreadable { .. } => fault,
+                };
+                return (None, fault.into());
+            }
+        };
+        let mut loader = Loader { library, out: Vec::new(), sources: Vec::new(), stack: Vec::new(), loaded: BTreeSet::new() };
         let layer = loader.file(&source, library_path.as_deref(), false);
         let Loader { mut out, sources, .. } = loader;
         let pipeline = layer.and_then(|layer| layer.finish(stem(&source.name), sources, &mut out));
-        if out.iter().any(|d| d.severity == Severity::Error) {
-            return Err(Diagnostics(out).sorted());
+        if pipeline.is_none() && out.is_empty() {
+            out.push(Diagnostic::error("the file has no pipeline", Span::new(&source, 0..0)));
         }
-        pipeline.ok_or_else(|| Diagnostic::error("the file has no pipeline", Span::new(&source, 0..0)).into())
+        (pipeline, Diagnostics(out).sorted())
     }
 }
 
@@ -53,8 +61,7 @@ struct Layer {
     nodes: IndexMap<String, NodeUse>,
     presents: Option<Spanned>,
     radiance: Option<Spanned>,
-    /// Files in it, so that a stage included twice counts once.
-    files: BTreeSet<String>,
+    gaps: Gaps,
 }
 
 struct Loader<'a> {
@@ -63,23 +70,16 @@ struct Loader<'a> {
     sources: Vec<Arc<Source>>,
     /// Files being read, from the pipeline inwards.
     stack: Vec<String>,
-    /// Texts read, so that a fault in a file read twice is reported once.
-    parsed: BTreeMap<String, ()>,
+    /// Files read: a stage included twice counts once.
+    loaded: BTreeSet<String>,
 }
 
 impl Loader<'_> {
     fn file(&mut self, source: &Arc<Source>, path: Option<&str>, as_stage: bool) -> Option<Layer> {
         let key = path.map_or_else(|| source.name.clone(), str::to_owned);
-        let first_time = self.parsed.insert(key.clone(), ()).is_none();
-        if first_time {
-            self.sources.push(Arc::clone(source));
-        }
-        let before = self.out.len();
-        let document = document::read(source, &stem(&source.name), &mut self.out);
-        if !first_time {
-            self.out.truncate(before);
-        }
-        let document = document?;
+        self.sources.push(Arc::clone(source));
+        self.loaded.insert(key.clone());
+        let document = document::read(source, &stem(&source.name), &mut self.out)?;
         if document.is_stage != as_stage {
             let message = if as_stage { "a pipeline cannot be included" } else { "a stage is no pipeline" };
             let help = if as_stage { "name it as `extends`, or make it a Stage(…)" } else { "name a pipeline that includes it, or make it a Pipeline(…)" };
@@ -88,21 +88,24 @@ impl Loader<'_> {
         }
         self.stack.push(key.clone());
         let mut base = Layer::default();
-        if let Some(extends) = &document.extends
-            && let Some((source, path)) = self.beside(source, path, extends, "extends")
-        {
-            base = self.file(&source, path.as_deref(), false).unwrap_or_default();
+        if let Some(extends) = &document.extends {
+            let found = self.beside(source, path, extends, "extends");
+            let layer = found.and_then(|(source, path)| self.file(&source, path.as_deref(), false));
+            base = layer.unwrap_or_else(|| Layer { gaps: Gaps { files: true, ..Gaps::default() }, ..Layer::default() });
         }
         let mut own = Layer::default();
-        own.files.insert(key);
         for include in &document.include {
-            let Some((source, path)) = self.beside(source, path, include, "includes") else { continue };
+            let Some((source, path)) = self.beside(source, path, include, "includes") else {
+                own.gaps.files = true;
+                continue;
+            };
             let key = path.clone().unwrap_or_else(|| source.name.clone());
-            if own.files.contains(&key) || base.files.contains(&key) {
+            if self.loaded.contains(&key) {
                 continue;
             }
-            if let Some(stage) = self.file(&source, path.as_deref(), true) {
-                self.join(&mut own, stage);
+            match self.file(&source, path.as_deref(), true) {
+                Some(stage) => self.join(&mut own, stage),
+                None => own.gaps.files = true,
             }
         }
         self.stack.pop();
@@ -125,11 +128,11 @@ impl Loader<'_> {
                 }
                 Some((source, path))
             }
-            Err(crate::library::ReadError::Missing(_)) => {
+            Err(ReadError::Missing(_)) => {
                 let help = self.library.suggest_document(&name.text);
                 self.out.push(
                     Diagnostic::error(format!("there is no file `{}`", name.text), name.span.clone())
-                        .help(format!("{help} Paths are relative to this file, then to `pipelines/`")),
+                        .help(and_also(help, "Paths are relative to this file, then to `pipelines/`")),
                 );
                 None
             }
@@ -142,7 +145,8 @@ impl Loader<'_> {
 
     /// Puts an included stage beside what is there; nothing may be given twice.
     fn join(&mut self, own: &mut Layer, stage: Layer) {
-        own.files.extend(stage.files);
+        own.gaps.extend(stage.gaps);
+        let before = self.out.len();
         for (name, param) in stage.params {
             let span = param.span.clone();
             self.insert(&mut own.params, name, param, "parameter", |p| p.span.clone(), span);
@@ -155,16 +159,20 @@ impl Loader<'_> {
             let span = node.id.span.clone();
             self.insert(&mut own.nodes, id, node, "node", |n| n.id.span.clone(), span);
         }
+        // What was given twice was left out once.
+        own.gaps.nodes |= self.out.len() > before;
     }
 
     fn join_document(&mut self, own: &mut Layer, document: Document) {
-        let Document { doc, head, set, params, resources, nodes, presents, radiance, .. } = document;
-        let mut layer = Layer { doc, head: Some(head), params, resources, presents, radiance, ..Layer::default() };
+        let Document { doc, head, set, params, resources, nodes, presents, radiance, gaps, .. } = document;
+        let mut layer = Layer { doc, head: Some(head), params, resources, presents, radiance, gaps, ..Layer::default() };
         layer.set.extend(set);
+        let before = self.out.len();
         for node in nodes {
             let span = node.id.span.clone();
             self.insert(&mut layer.nodes, node.id.text.clone(), node, "node", |n| n.id.span.clone(), span);
         }
+        layer.gaps.nodes |= self.out.len() > before;
         let Layer { doc, head, set, presents, radiance, .. } = &mut layer;
         own.doc = std::mem::take(doc);
         own.head = head.take();
@@ -194,7 +202,7 @@ impl Loader<'_> {
 impl Layer {
     /// Lays another over this one: what it gives wins.
     fn overlay(&mut self, over: Self) {
-        let Self { doc, head, params, set, resources, nodes, presents, radiance, files } = over;
+        let Self { doc, head, params, set, resources, nodes, presents, radiance, gaps } = over;
         self.doc = doc;
         self.head = head;
         self.params.extend(params);
@@ -203,16 +211,18 @@ impl Layer {
         self.nodes.extend(nodes);
         self.presents = presents.or(self.presents.take());
         self.radiance = radiance.or(self.radiance.take());
-        self.files.extend(files);
+        self.gaps.extend(gaps);
     }
 
     fn finish(self, name: String, sources: Vec<Arc<Source>>, out: &mut Vec<Diagnostic>) -> Option<Pipeline> {
-        let Self { doc, head, params, set, resources, nodes, presents, radiance, .. } = self;
+        let Self { doc, head, params, set, resources, nodes, presents, radiance, gaps, .. } = self;
         let Some(presents) = presents else {
-            let fault = Diagnostic::error("missing field `presents` in Pipeline", head?);
-            out.push(fault.help("add `presents: \"…\"` with the name of the texture to show"));
+            if !gaps.files {
+                let fault = Diagnostic::error("missing field `presents` in Pipeline", head?);
+                out.push(fault.help("add `presents: \"…\"` with the name of the texture to show"));
+            }
             return None;
         };
-        Some(Pipeline { name, doc, params, set, resources, nodes, presents, radiance, sources })
+        Some(Pipeline { name, doc, params, set, resources, nodes, presents, radiance, sources, gaps })
     }
 }

@@ -254,11 +254,13 @@ fn read_options(reader: &mut Reader, tree: &Tree) -> Option<Vec<String>> {
 }
 
 /// Names are WGSL identifiers: letters, digits and `_`.
-pub(crate) fn check_identifier(reader: &mut Reader, name: &Spanned, what: &str) {
+pub(crate) fn check_identifier(reader: &mut Reader, name: &Spanned, what: &str) -> bool {
     let mut chars = name.text.chars();
     let first = chars.next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_');
     if !(first && chars.all(|c| c.is_ascii_alphanumeric() || c == '_')) {
         let fault = crate::diagnostics::Diagnostic::error(format!("`{}` is no name for a {what}", name.text), name.span.clone());
         reader.out.push(fault.help("use letters, digits and `_`, not starting with a digit"));
+        return false;
     }
+    true
 }

@@ -1,6 +1,6 @@
 //! A pipeline as its documents say it, with `extends` and `include` carried out and the place of everything.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use indexmap::IndexMap;
 
@@ -35,6 +35,28 @@ pub struct Pipeline {
     pub radiance: Option<Spanned>,
     /// Every file read, the pipeline's own first.
     pub sources: Vec<Arc<Source>>,
+    /// What could not be read; empty in a pipeline without faults.
+    pub(crate) gaps: Gaps,
+}
+
+/// What is missing from a pipeline because of faults in its text, so that nothing that follows from them is reported.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Gaps {
+    pub params: BTreeSet<String>,
+    pub resources: BTreeSet<String>,
+    /// Some node was left out.
+    pub nodes: bool,
+    /// Some file was left out: any name may have been in it.
+    pub files: bool,
+}
+
+impl Gaps {
+    pub fn extend(&mut self, other: Self) {
+        self.params.extend(other.params);
+        self.resources.extend(other.resources);
+        self.nodes |= other.nodes;
+        self.files |= other.files;
+    }
 }
 
 /// A value given in `set`.
@@ -125,6 +147,8 @@ pub struct NodeUse {
     pub when: Option<Condition>,
     /// File stem of the document that declares it.
     pub stage: String,
+    /// Something in it could not be read.
+    pub(crate) broken: bool,
 }
 
 /// A port and the resource at it.

@@ -18,43 +18,56 @@ pub struct Spanned {
 }
 
 /// Collects the faults of one file.
-pub(crate) struct Reader {
+pub struct Reader {
+    /// The file.
     pub source: Arc<Source>,
+    /// Its faults so far.
     pub out: Vec<Diagnostic>,
-    /// The syntax had faults: what is missing may only have been skipped.
-    broken: bool,
 }
 
 /// Fields of a record.
-pub(crate) struct Fields<'t> {
+pub struct Fields<'t> {
     found: Vec<(&'t Name, &'t Tree)>,
+    /// Fields that were meant, but are misspelt.
+    meant: Vec<&'static str>,
 }
 
 impl<'t> Fields<'t> {
+    /// The value of a field, if it is there.
     pub fn get(&self, name: &str) -> Option<&'t Tree> {
         self.found.iter().find(|(n, _)| n.text == name).map(|(_, tree)| *tree)
+    }
+
+    /// Whether the field is there, be it misspelt.
+    pub fn tried(&self, name: &str) -> bool {
+        self.get(name).is_some() || self.meant.contains(&name)
     }
 }
 
 /// What a record must and may have.
-pub(crate) struct Shape {
+pub struct Shape {
+    /// The word for it in messages.
     pub what: &'static str,
+    /// Fields that must be there.
     pub required: &'static [&'static str],
+    /// Fields that may be there.
     pub optional: &'static [&'static str],
 }
 
 impl Reader {
-    /// Parses the source; the tree is `None` when nothing could be read.
+    /// Parses the source; the tree is `None` when the syntax has faults, which are in [`Reader::out`].
     pub fn open(source: &Arc<Source>) -> (Self, Option<Tree>) {
         let mut out = Vec::new();
-        let (tree, broken) = tree::parse(source, &mut out);
-        (Self { source: Arc::clone(source), out, broken }, tree)
+        let tree = tree::parse(source, &mut out);
+        (Self { source: Arc::clone(source), out }, tree)
     }
 
+    /// A place in the file.
     pub fn span(&self, range: &Range<usize>) -> Span {
         Span::new(&self.source, range.clone())
     }
 
+    /// Adds a fault; an empty help is left out.
     pub fn error(&mut self, range: &Range<usize>, message: impl Into<String>, help: impl Into<String>) {
         let help = help.into();
         let mut fault = Diagnostic::error(message, self.span(range));
@@ -67,10 +80,11 @@ impl Reader {
     /// "expected a, found b", unless a syntax error stands there.
     pub fn expected(&mut self, tree: &Tree, what: &str, help: &str) {
         if !matches!(tree.kind, Kind::Broken) {
-            self.error(&tree.range, format!("expected {what}, found {}", tree.kind.describe()), help);
+            self.error(&head(tree), format!("expected {what}, found {}", tree.kind.describe()), help);
         }
     }
 
+    /// A string in quotes.
     pub fn text(&mut self, tree: &Tree, what: &str) -> Option<Spanned> {
         match &tree.kind {
             Kind::Text(text) => Some(Spanned { text: text.clone(), span: self.span(&tree.range) }),
@@ -85,6 +99,7 @@ impl Reader {
         }
     }
 
+    /// `true` or `false`.
     pub fn boolean(&mut self, tree: &Tree) -> Option<bool> {
         match tree.kind {
             Kind::Bool(value) => Some(value),
@@ -95,6 +110,7 @@ impl Reader {
         }
     }
 
+    /// A whole number of 64 bits.
     pub fn int(&mut self, tree: &Tree, what: &str) -> Option<i64> {
         match &tree.kind {
             Kind::Number { raw, real: false } => {
@@ -115,6 +131,7 @@ impl Reader {
         }
     }
 
+    /// A finite number, with or without a fraction.
     pub fn float(&mut self, tree: &Tree, what: &str) -> Option<f64> {
         match &tree.kind {
             Kind::Number { raw, .. } => {
@@ -131,6 +148,7 @@ impl Reader {
         }
     }
 
+    /// The items of a list; none when it is no list.
     pub fn list<'t>(&mut self, tree: &'t Tree, what: &str) -> &'t [Tree] {
         match &tree.kind {
             Kind::List(items) => items,
@@ -172,8 +190,8 @@ impl Reader {
             Kind::Tuple(_, items) if items.is_empty() => &[],
             Kind::Name(_) => &[],
             Kind::Tuple(_, items) => {
-                let first = required.first().or(optional.first()).unwrap_or(&"name");
-                self.error(&items[0].range, format!("{what} takes named fields"), format!("write `{first}: …`"));
+                let names: Vec<String> = optional.iter().chain(required).map(|name| format!("`{name}: …`")).collect();
+                self.error(&items[0].range, format!("{what} takes named fields"), format!("put the name before the value: {}", names.join(", ")));
                 return None;
             }
             _ => {
@@ -196,27 +214,20 @@ impl Reader {
                 found.push((name, value));
             }
         }
-        if !self.broken {
-            // A misspelt field is not also missing.
-            let misspelt = fields.len() > found.len();
-            for name in required {
-                if !found.iter().any(|(n, _)| n.text == **name) && !(misspelt && near_unknown(fields, required, optional, name)) {
-                    let place = head(tree);
-                    self.error(&place, format!("missing field `{name}` in {what}"), format!("add `{name}: …`"));
-                }
+        let all = || required.iter().chain(optional).copied();
+        let strangers = fields.iter().map(|(name, _)| name.text.as_str()).filter(|name| !all().any(|k| k == *name));
+        let meant: Vec<&str> = strangers.filter_map(|name| crate::render::nearest(name, all())).collect();
+        for name in required {
+            if !found.iter().any(|(n, _)| n.text == *name) && !meant.contains(name) {
+                self.error(&head(tree), format!("missing field `{name}` in {what}"), format!("add `{name}: …`"));
             }
         }
-        Some(Fields { found })
+        Some(Fields { found, meant })
     }
 }
 
-fn near_unknown(fields: &[(Name, Tree)], required: &[&str], optional: &[&str], wanted: &str) -> bool {
-    let all = || required.iter().chain(optional).copied();
-    fields.iter().any(|(name, _)| !all().any(|k| k == name.text) && crate::render::nearest(&name.text, all()) == Some(wanted))
-}
-
 /// The place to point at for a whole value: the name of a record, or its opening bracket.
-pub(crate) fn head(tree: &Tree) -> Range<usize> {
+pub fn head(tree: &Tree) -> Range<usize> {
     match &tree.kind {
         Kind::Record(Some(name), _) | Kind::Tuple(Some(name), _) => name.range.clone(),
         Kind::Record(None, _) | Kind::Tuple(None, _) => tree.range.start..(tree.range.start + 1).min(tree.range.end),

@@ -290,7 +290,11 @@ fn add_plain(module: &Module, ty: Handle<Type>, layouts: &mut BTreeMap<String, L
 
 fn member_kind(module: &Module, ty: Handle<Type>) -> Option<MemberKind> {
     let numeric = |s: naga::Scalar, rows: u32, columns: u32| {
-        let column_stride = if rows == 3 { 16 } else { rows * 4 };
+        let column_stride = match (columns, rows) {
+            (1, _) => 0,
+            (_, 3) => 16,
+            _ => rows * 4,
+        };
         Some(MemberKind::Numeric { scalar: scalar(s)?, rows, columns, column_stride })
     };
     match &module.types[ty].inner {
@@ -324,6 +328,6 @@ pub(crate) fn plain_layout(name: &str) -> Option<Layout> {
         }
     };
     let stride = if rows == 3 { 16 } else { rows * 4 };
-    let kind = MemberKind::Numeric { scalar, rows, columns: 1, column_stride: stride };
+    let kind = MemberKind::Numeric { scalar, rows, columns: 1, column_stride: 0 };
     Some(Layout { size: stride, members: vec![Member { name: String::new(), offset: 0, kind }] })
 }

@@ -194,7 +194,7 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
 }
 
 /// The help for an unknown name: the nearest one, or what there is.
-pub(crate) fn suggest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+pub fn suggest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     const MOST_LISTED: usize = 16;
     let known: Vec<&str> = known.into_iter().collect();
     if let Some(near) = nearest(name, known.iter().copied()) {
@@ -208,4 +208,10 @@ pub(crate) fn suggest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
         let _ = write!(list, ", and {} more", known.len() - MOST_LISTED);
     }
     format!("there is {list}")
+}
+
+/// A help and another sentence.
+pub(crate) fn and_also(help: String, more: &str) -> String {
+    let stop = if help.ends_with('?') { "" } else { "." };
+    format!("{help}{stop} {more}")
 }

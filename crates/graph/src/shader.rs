@@ -112,7 +112,7 @@ pub enum MemberKind {
         rows: u32,
         /// Columns of a matrix; 1 otherwise.
         columns: u32,
-        /// Bytes between columns of a matrix.
+        /// Bytes between columns of a matrix; 0 otherwise.
         column_stride: u32,
     },
     /// A fixed-size array of such.

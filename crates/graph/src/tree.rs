@@ -11,28 +11,41 @@ const DEEPEST_NESTING: usize = 96;
 
 /// A value.
 #[derive(Debug)]
-pub(crate) struct Tree {
+pub struct Tree {
+    /// What it is.
     pub kind: Kind,
+    /// Its bytes in the source.
     pub range: Range<usize>,
 }
 
 /// A name with its place.
 #[derive(Debug, Clone)]
-pub(crate) struct Name {
+pub struct Name {
+    /// The name.
     pub text: String,
+    /// Its bytes in the source.
     pub range: Range<usize>,
 }
 
 /// What a value is.
 #[derive(Debug)]
-pub(crate) enum Kind {
+pub enum Kind {
+    /// `true` or `false`.
     Bool(bool),
-    /// As written; whether it has a fraction or exponent.
-    Number { raw: String, real: bool },
+    /// A number.
+    Number {
+        /// As written, without `_`.
+        raw: String,
+        /// Whether it has a fraction or exponent.
+        real: bool,
+    },
+    /// A string in quotes.
     Text(String),
     /// A bare identifier: `Full`.
     Name(String),
+    /// `[a, b]`.
     List(Vec<Tree>),
+    /// `{key: value}`.
     Map(Vec<(Tree, Tree)>),
     /// `(a, b)` or `Name(a, b)`; also `()` and `Name()`.
     Tuple(Option<Name>, Vec<Tree>),
@@ -62,12 +75,18 @@ impl Kind {
     }
 }
 
-/// Parses a document. Faults go to `out`; what could be read is returned. The flag tells whether the syntax had faults.
-pub(crate) fn parse(source: &Arc<Source>, out: &mut Vec<Diagnostic>) -> (Option<Tree>, bool) {
+/// The keys of a map that are strings.
+pub(crate) fn keys(tree: &Tree) -> Vec<String> {
+    let Kind::Map(entries) = &tree.kind else { return Vec::new() };
+    entries.iter().filter_map(|(key, _)| if let Kind::Text(text) = &key.kind { Some(text.clone()) } else { None }).collect()
+}
+
+/// Parses a document. When the syntax has faults, they go to `out` and there is no tree: what else is wrong may follow from them.
+pub(crate) fn parse(source: &Arc<Source>, out: &mut Vec<Diagnostic>) -> Option<Tree> {
     let text: &str = &source.text;
     if let Err(fault) = check_brackets(source) {
         out.push(fault);
-        return (None, true);
+        return None;
     }
     let (document, errors) = ast::parse_document_lossy(text);
     let broken = !errors.is_empty();
@@ -83,24 +102,22 @@ pub(crate) fn parse(source: &Arc<Source>, out: &mut Vec<Diagnostic>) -> (Option<
         last_line = line;
         out.push(Diagnostic::error(message(&error), Span::new(source, span.start_offset..span.end_offset.max(span.start_offset))));
     }
-    match document.value {
-        Some(value) => (Some(tree(&value)), broken),
-        None => {
-            if !broken {
-                out.push(
-                    Diagnostic::error("the file is empty", Span::new(source, 0..0)).help("write `Pipeline(…)`, `Stage(…)` or `Node(…)`"),
-                );
-            }
-            (None, true)
-        }
+    if broken {
+        return None;
     }
+    if document.value.is_none() {
+        out.push(Diagnostic::error("the file is empty", Span::new(source, 0..0)).help("see the other files of its folder for what belongs here"));
+    }
+    document.value.as_ref().map(tree)
 }
 
 fn message(error: &ron2::Error) -> String {
     let text = error.kind().to_string();
     let mut chars = text.chars();
     let lower: String = chars.next().map(|first| first.to_lowercase().chain(chars).collect()).unwrap_or_default();
-    lower.trim_end_matches('.').replace("closing `)` or `}`", "closing `)`").replace("after map key", "after the key")
+    let text = lower.trim_end_matches('.').replace("closing `)` or `}`", "closing `)`").replace("after map key", "after the key");
+    // Brackets are known to match, so what is missing before a closing one is a comma.
+    text.replace("expected closing", "expected a comma or the closing")
 }
 
 fn range(span: &ron2::Span) -> Range<usize> {

@@ -27,6 +27,8 @@ pub(crate) struct Scan {
     /// Attributes such as `@compute` with their places.
     pub attributes: Vec<(String, Range<usize>)>,
     pub paths: Vec<Path>,
+    /// The `{` of an import that is never closed.
+    pub unclosed: Option<Range<usize>>,
     /// `#` directives other than `#import`, by word.
     pub directives: Vec<(String, Range<usize>)>,
 }
@@ -135,7 +137,7 @@ pub(crate) fn scan(text: &str) -> Scan {
             }
             Token::Mark(b'#') => match tokens.get(at + 1) {
                 Some((Token::Word("import"), _)) => {
-                    at = read_import(&tokens, at + 2, &mut scan.paths);
+                    at = read_import(&tokens, at + 2, &mut scan);
                     continue;
                 }
                 Some((Token::Word(name), place)) => scan.directives.push(((*name).to_owned(), range.start..place.end)),
@@ -177,8 +179,10 @@ fn after_template(tokens: &[(Token<'_>, Range<usize>)], mut at: usize) -> usize 
 }
 
 /// Reads what follows `#import`: a path, or `prefix::{a, b::{c}}`, up to the end of the line outside of braces.
-fn read_import(tokens: &[(Token<'_>, Range<usize>)], mut at: usize, paths: &mut Vec<Path>) -> usize {
+fn read_import(tokens: &[(Token<'_>, Range<usize>)], mut at: usize, scan: &mut Scan) -> usize {
+    let Scan { paths, unclosed, .. } = scan;
     let mut prefixes: Vec<String> = Vec::new();
+    let mut open = 0..0;
     let mut current: Option<(String, Range<usize>)> = None;
     let mut renamed = false;
     let mut flush = |current: &mut Option<(String, Range<usize>)>, prefixes: &[String]| {
@@ -188,12 +192,22 @@ fn read_import(tokens: &[(Token<'_>, Range<usize>)], mut at: usize, paths: &mut 
     };
     while let Some((token, range)) = tokens.get(at) {
         match token {
+            // Nothing of the kind stands in an import.
+            Token::Mark(b'@' | b'#' | b';' | b'(' | b'=') if !prefixes.is_empty() => {
+                *unclosed = Some(open);
+                return at;
+            }
+            Token::Word(word) if !prefixes.is_empty() && KEYWORDS.contains(word) => {
+                *unclosed = Some(open);
+                return at;
+            }
             Token::Word("as") => renamed = true,
             Token::Word(_) if renamed => renamed = false,
             Token::Word(word) => current = Some(((*word).to_owned(), range.clone())),
             // `::` before a brace is not part of a word.
             Token::Mark(b'{') => {
                 let (prefix, _) = current.take().unwrap_or_default();
+                open = range.clone();
                 prefixes.push(format!("{}::", prefix.trim_end_matches(':')));
             }
             Token::Mark(b'}') => {
@@ -206,7 +220,11 @@ fn read_import(tokens: &[(Token<'_>, Range<usize>)], mut at: usize, paths: &mut 
         }
         at += 1;
     }
-    flush(&mut current, &prefixes);
+    if prefixes.is_empty() {
+        flush(&mut current, &prefixes);
+    } else {
+        *unclosed = Some(open);
+    }
     at
 }
 

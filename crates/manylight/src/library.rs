@@ -6,19 +6,23 @@ use std::{
 };
 
 use include_dir::{Dir, include_dir};
-use manylight_graph::library::Library;
+use manylight_graph::{library::Library, nearest};
+use manylight_passes::SceneSource;
 
 use crate::fault::Fault;
 
-static SHADERS: Dir = include_dir!("$CARGO_MANIFEST_DIR/shaders");
-static PIPELINES: Dir = include_dir!("$CARGO_MANIFEST_DIR/pipelines");
-static ASSETS: Dir = include_dir!("$CARGO_MANIFEST_DIR/assets");
+static SHADERS: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/shaders");
+static PIPELINES: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/pipelines");
+static ASSETS: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/assets");
 
 /// The environment variable that names the root folder.
 pub const ROOT_VARIABLE: &str = "MANYLIGHT_ROOT";
 
 /// The library with the root given, else the one that `MANYLIGHT_ROOT` names, else the nearest folder at or above the
 /// current one that has `shaders/` and `pipelines/`, else only what is embedded.
+///
+/// # Errors
+/// The folder that was named is no root.
 pub fn open(root: Option<&Path>) -> Result<Library, Fault> {
     let named = match (root, env::var_os(ROOT_VARIABLE)) {
         (Some(root), _) => Some((root.to_owned(), "--root")),
@@ -28,11 +32,18 @@ pub fn open(root: Option<&Path>) -> Result<Library, Fault> {
     let root = match named {
         Some((root, _)) if is_root(&root) => Some(root),
         Some((root, origin)) => {
-            return Err(Fault::Input(format!("{origin}: `{}` has no folders `shaders` and `pipelines`", root.display())));
+            return Err(Fault::Input(format!("{origin}: `{}` does not have the folders `shaders` and `pipelines`", root.display())));
         }
         None => env::current_dir().ok().and_then(|folder| root_above(&folder)),
     };
-    Ok(Library::new(root, embedded()))
+    Ok(at(root))
+}
+
+/// The library of a root folder, or the embedded one.
+pub fn at(root: Option<PathBuf>) -> Library {
+    let texts = [("shaders", &SHADERS), ("pipelines", &PIPELINES)].map(|(folder, dir)| embedded(folder, dir));
+    let text = |(name, bytes): (String, &'static [u8])| std::str::from_utf8(bytes).ok().map(|text| (name, text));
+    Library::new(root, texts.into_iter().flatten().filter_map(text).collect())
 }
 
 /// The nearest folder at or above `folder` with `shaders/` and `pipelines/`.
@@ -44,25 +55,52 @@ fn is_root(folder: &Path) -> bool {
     folder.join("shaders").is_dir() && folder.join("pipelines").is_dir()
 }
 
-/// Every text file built into the program, by its path below the root (`shaders/ism/splat.wgsl`).
-pub fn embedded() -> Vec<(String, &'static str)> {
-    let mut files = Vec::new();
-    for (folder, dir) in [("shaders", &SHADERS), ("pipelines", &PIPELINES), ("assets", &ASSETS)] {
-        collect(folder, dir, &mut files);
+/// A scene by path (`rooms/hall.ron`, `mesh.obj`) or by name in `assets/` (`cornell`), on disk or embedded.
+///
+/// # Errors
+/// There is no such scene; the nearest name is told.
+pub fn scene(library: &Library, name: &str) -> Result<SceneSource, Fault> {
+    if Path::new(name).is_file() {
+        return Ok(SceneSource::file(name));
     }
-    files.sort();
-    files
-}
-
-fn collect(folder: &str, dir: &Dir<'static>, files: &mut Vec<(String, &'static str)>) {
-    for file in dir.files() {
-        if let Some(text) = file.contents_utf8() {
-            files.push((format!("{folder}/{}", slashes(file.path())), text));
+    let plain = name.replace('\\', "/");
+    let built_in = embedded("assets", &ASSETS);
+    for path in [plain.clone(), format!("assets/{plain}"), format!("assets/{plain}.ron"), format!("assets/{plain}.obj")] {
+        if let Some(file) = library.root().map(|root| root.join(&path)).filter(|file| file.is_file()) {
+            return Ok(SceneSource::file(file));
+        }
+        if built_in.iter().any(|(known, _)| *known == path) {
+            return Ok(SceneSource::embedded(path, built_in));
         }
     }
-    for inner in dir.dirs() {
-        collect(folder, inner, files);
+    if Path::new(name).is_dir() {
+        return Err(Fault::Input(format!("the scene `{name}` is a folder: name a .ron or .obj file in it")));
     }
+    let known = scene_names(library);
+    let help = match nearest(name, known.iter().map(String::as_str)) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None if known.is_empty() => "name a .ron or .obj file".to_owned(),
+        None => format!("name a .ron or .obj file, or one of {}", known.join(", ")),
+    };
+    Err(Fault::Input(format!("there is no scene `{name}`; {help}")))
+}
+
+/// Names of the scenes in `assets/`.
+pub fn scene_names(library: &Library) -> Vec<String> {
+    let mut names: Vec<String> = embedded("assets", &ASSETS).into_iter().map(|(name, _)| name).collect();
+    names.extend(library.list("assets", "ron"));
+    let stem = |name: &String| Some(name.strip_prefix("assets/")?.strip_suffix(".ron")?.to_owned());
+    let mut stems: Vec<String> = names.iter().filter_map(stem).collect();
+    stems.sort();
+    stems.dedup();
+    stems
+}
+
+/// Every file built into the program below a folder, by its path (`shaders/ism/splat.wgsl`).
+fn embedded(folder: &str, dir: &Dir<'static>) -> Vec<(String, &'static [u8])> {
+    let mut files: Vec<_> = dir.files().map(|f| (format!("{folder}/{}", slashes(f.path())), f.contents())).collect();
+    files.extend(dir.dirs().flat_map(|inner| embedded(folder, inner)));
+    files
 }
 
 fn slashes(path: &Path) -> String {
@@ -75,8 +113,8 @@ mod tests {
 
     #[test]
     fn shaders_are_embedded_under_their_library_paths() {
-        let files = embedded();
-        assert!(files.iter().any(|(name, text)| name == "shaders/common/scene.wgsl" && text.contains("struct View")));
+        let text = at(None).read("shaders/common/scene.wgsl").expect("embedded").text.clone();
+        assert!(text.contains("struct View"));
     }
 
     #[test]
@@ -91,7 +129,14 @@ mod tests {
     #[test]
     fn a_root_without_shaders_is_refused() {
         let folder = tempfile::tempdir().expect("temporary folder");
-        let fault = open(Some(folder.path())).err().expect("no root");
+        let fault = open(Some(folder.path())).expect_err("no root");
         assert!(matches!(&fault, Fault::Input(text) if text.contains("--root")), "{fault}");
+    }
+
+    #[test]
+    fn an_unknown_scene_is_an_error() {
+        let fault = scene(&at(None), "no_such_scene_at_all").expect_err("unknown");
+        assert!(fault.to_string().contains("no_such_scene_at_all"), "{fault}");
+        assert!(scene(&at(None), "/").expect_err("a folder").to_string().contains("folder"));
     }
 }

@@ -13,7 +13,7 @@ pub enum CompareError {
     #[allow(missing_docs)]
     Size { image_width: usize, image_height: usize, reference_width: usize, reference_height: usize },
     /// They differ in their channels.
-    #[error("the image has the channels {image}, the reference {reference}: name a layer with --layer or --reference-layer")]
+    #[error("the image has the channels {image}, the reference {reference}: pictures with the same channels can be compared")]
     #[allow(missing_docs)]
     Channels { image: String, reference: String },
     /// One is linear, the other for the display.
@@ -52,14 +52,14 @@ pub struct Metrics {
 }
 
 impl Metrics {
-    /// RMSE over the mean of the reference; `None` when the reference is black.
+    /// RMSE over the magnitude of the reference's mean; `None` when that is 0.
     pub fn relative_rmse(&self) -> Option<f64> {
-        self.over_mean(self.rmse)
+        self.over_mean(self.rmse).map(f64::abs)
     }
 
-    /// Mean absolute error over the mean of the reference; `None` when the reference is black.
+    /// Mean absolute error over the magnitude of the reference's mean; `None` when that is 0.
     pub fn relative_mean_absolute_error(&self) -> Option<f64> {
-        self.over_mean(self.mean_absolute_error)
+        self.over_mean(self.mean_absolute_error).map(f64::abs)
     }
 
     /// Mean of the image less that of the reference.

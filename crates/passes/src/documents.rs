@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use manylight_gpu::{HostNodes, WatchSet};
 use manylight_graph::{
-    diagnostics::Diagnostics,
+    diagnostics::{Diagnostic, Diagnostics},
     library::Library,
     pipeline::Pipeline,
     plan::{Plan, PlanInput},
@@ -63,9 +63,17 @@ impl Documents {
     /// What will run.
     ///
     /// # Errors
-    /// The pipeline's faults under this input, together with those of faulty nodes.
+    /// The pipeline's faults under this input. If it uses faulty nodes, the faults of the nodes themselves.
     pub fn plan(&self, input: &PlanInput) -> Result<Plan, Diagnostics> {
-        planner::plan(&self.pipeline, &self.registry, input).map_err(|faults| together(self.registry_faults.clone(), faults))
+        planner::plan(&self.pipeline, &self.registry, input).map_err(|faults| {
+            // That a faulty node cannot be used follows from its own faults: those are told instead.
+            let follows = |fault: &Diagnostic| self.registry.faulty.iter().any(|n| fault.message.starts_with(&format!("the node `{n}` cannot be used")));
+            let (secondary, own): (Vec<_>, Vec<_>) = faults.0.into_iter().partition(follows);
+            if secondary.is_empty() || !self.registry_faults.has_errors() {
+                return Diagnostics([own, secondary].concat());
+            }
+            together(self.registry_faults.clone(), Diagnostics(own))
+        })
     }
 
     /// Where documents and shaders come from.

@@ -145,11 +145,12 @@ impl SceneUpload {
             upload_static(gpu, externals, scene)?;
             self.scene = Some(scene.hash);
         }
+        let (camera, light, light_view) = (state.camera_view(aspect), state.light(), state.light_view());
         let parts: [(&'static str, &[u8]); 6] = [
             ("frame", bytes_of(frame)),
-            ("scene_camera", bytes_of(&state.camera_view(aspect))),
-            ("scene_light", bytes_of(&state.light())),
-            ("scene_light_view", bytes_of(&state.light_view())),
+            ("scene_camera", bytes_of(&camera)),
+            ("scene_light", bytes_of(&light)),
+            ("scene_light_view", bytes_of(&light_view)),
             ("scene_info", bytes_of(&state.info)),
             ("scene_objects", cast_slice(&state.objects)),
         ];

@@ -47,8 +47,9 @@ impl FileReader for Embedded {
     }
 }
 
-/// The path without `.` and with `..` taken back, so that equal places have equal names.
-pub(crate) fn plain(path: &Path) -> PathBuf {
+/// The path without `.` and with `..` taken back, so that equal places in the program have equal names. On disk this would be wrong: `..`
+/// after a link leads elsewhere.
+fn plain(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for component in path.components() {
         match component {
@@ -64,7 +65,12 @@ pub(crate) fn plain(path: &Path) -> PathBuf {
 
 /// The path of a file named in another one: relative to that file's folder. Accepts backslashes.
 pub(crate) fn beside(file: &Path, name: &str) -> PathBuf {
-    plain(&file.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/")))
+    without_dots(&file.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/")))
+}
+
+/// The path without `.`.
+pub(crate) fn without_dots(path: &Path) -> PathBuf {
+    path.components().filter(|component| *component != Component::CurDir).collect()
 }
 
 /// Reads files, and remembers which and a hash of their contents.

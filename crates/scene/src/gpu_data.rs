@@ -272,7 +272,17 @@ pub fn layouts() -> Vec<(&'static str, Layout)> {
         layout!(SpotLight { position, beam_rad, direction, cutoff_rad, intensity, falloff }),
         layout!(Frame { index, seed, time, delta_time }),
         layout!(SceneInfo {
-            bounds_min, diagonal, bounds_max, total_area, area_min, area_max, edge_min, edge_max, triangle_count, object_count, light_count,
+            bounds_min,
+            diagonal,
+            bounds_max,
+            total_area,
+            area_min,
+            area_max,
+            edge_min,
+            edge_max,
+            triangle_count,
+            object_count,
+            light_count,
             texture_count
         }),
         layout!(Vertex { position, u, normal, v }),

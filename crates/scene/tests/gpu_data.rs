@@ -19,8 +19,11 @@ fn round_up(value: u32, to: u32) -> u32 {
     value.div_ceil(to) * to
 }
 
-/// Structures of a WGSL text: names, members (name, offset, size), size; laid out by the rules of WGSL.
-fn wgsl_structs(text: &str) -> Vec<(String, Vec<(String, u32, u32)>, u32)> {
+/// Name, offset and size of a member.
+type Member = (String, u32, u32);
+
+/// Structures of a WGSL text: names, members, size; laid out by the rules of WGSL.
+fn wgsl_structs(text: &str) -> Vec<(String, Vec<Member>, u32)> {
     let mut out = Vec::new();
     for part in text.split("struct ").skip(1) {
         let (name, rest) = part.split_once('{').unwrap();
@@ -64,15 +67,8 @@ fn layouts_are_those_of_the_wgsl() {
 
 #[test]
 fn the_known_view_of_the_cornell_box() {
-    let view = View::perspective(
-        Vec3::new(2.78, 2.73, -8.0),
-        Vec3::new(2.78, 2.73, 0.0),
-        Vec3::Y,
-        39.3077_f32.to_radians(),
-        1.0,
-        0.01,
-        50.0,
-    );
+    let view =
+        View::perspective(Vec3::new(2.78, 2.73, -8.0), Vec3::new(2.78, 2.73, 0.0), Vec3::Y, 39.3077_f32.to_radians(), 1.0, 0.01, 50.0);
     assert_eq!(view.forward, Vec3::Z);
     assert_eq!(view.right, Vec3::NEG_X);
     assert_eq!(view.up, Vec3::Y);

@@ -17,7 +17,10 @@ usemtl floor\nf 1 2 3 4\nusemtl ceiling\nf 5 8 7 6\nusemtl walls\nf 1 5 6 2\nf 2
 pub fn load<B: AsRef<[u8]>>(path: &str, files: &[(&str, B)]) -> Result<Scene, Diagnostics> {
     let files: HashMap<&str, &[u8]> = files.iter().map(|(name, bytes)| (*name, bytes.as_ref())).collect();
     let reader = move |path: &Path| {
-        let name = path.to_string_lossy().replace('\\', "/");
+        let mut name = path.to_string_lossy().replace('\\', "/");
+        if let Some((before, after)) = name.split_once("/../") {
+            name = before.rsplit_once('/').map_or(after.to_owned(), |(parent, _)| format!("{parent}/{after}"));
+        }
         files.get(name.as_str()).map(|bytes| bytes.to_vec()).ok_or_else(|| io::ErrorKind::NotFound.into())
     };
     Scene::load_with(path, &reader)

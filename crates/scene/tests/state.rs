@@ -29,7 +29,8 @@ fn objects_move_and_carry_their_area() {
 
 #[test]
 fn normals_stay_normal_under_uneven_and_mirrored_scales() {
-    let scene = ron("Scene(meshes: [Mesh(file: \"tri.obj\", transform: (rotate_deg: (30.0, 40.0, 50.0), scale: (2.0, -0.5, 3.0)))])").unwrap();
+    let scene =
+        ron("Scene(meshes: [Mesh(file: \"tri.obj\", transform: (rotate_deg: (30.0, 40.0, 50.0), scale: (2.0, -0.5, 3.0)))])").unwrap();
     let object = scene.sample(0.0).objects[0];
     // A plane with normal n and tangents t, u.
     let (n, t, u) = (Vec3::new(1.0, 2.0, 2.0) / 3.0, Vec3::new(2.0, -2.0, 1.0), Vec3::new(2.0, 1.0, -2.0));
@@ -93,7 +94,7 @@ fn near_and_far_hold_the_scene() {
 #[test]
 fn fitted_camera_and_light_see_and_light_the_scene() {
     let scene = obj(crate::memory::ROOM).unwrap();
-    assert_eq!(scene.warnings.0.len(), 2 + 3, "{:?}", crate::memory::summary(&scene.warnings));
+    assert_eq!(scene.warnings.0.len(), 3, "{:?}", crate::memory::summary(&scene.warnings));
     let state = scene.sample(0.0);
     for aspect in [0.5, 1.0, 16.0 / 9.0] {
         let view = state.camera_view(aspect);

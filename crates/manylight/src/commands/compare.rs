@@ -5,31 +5,44 @@ use std::path::Path;
 use manylight::{
     fault::Fault,
     files::{Picture, read_picture},
-    metrics::{Metrics, compare},
+    metrics::{CompareError, Metrics, compare},
 };
 
 use crate::cli::{CompareArgs, TextOrJson};
 
 /// Reads both pictures, compares them and prints the numbers.
 pub fn run(args: &CompareArgs) -> Result<(), Fault> {
-    let image = read_layer(&args.image, args.layer.as_deref())?;
-    let reference = read_layer(&args.reference, args.reference_layer.as_deref())?;
-    let metrics = compare(&image, &reference).map_err(|e| Fault::Input(e.to_string()))?;
+    let (image, image_layers) = read_layer(&args.image, args.layer.as_deref())?;
+    let (reference, reference_layers) = read_layer(&args.reference, args.reference_layer.as_deref())?;
+    let metrics = compare(&image, &reference).map_err(|error| {
+        let mut text = error.to_string();
+        if matches!(error, CompareError::Channels { .. }) {
+            for (what, option, layers) in [("image", "--layer", image_layers), ("reference", "--reference-layer", reference_layers)] {
+                if !layers.is_empty() {
+                    text.push_str(&format!("; the {what} has the layers {} ({option} NAME)", layers.join(", ")));
+                }
+            }
+        }
+        Fault::Input(text)
+    })?;
     match args.format {
         TextOrJson::Json => super::print(&format!("{:#}\n", metrics.to_json())),
         TextOrJson::Text => super::print(&text(&metrics)),
     }
 }
 
-fn read_layer(path: &Path, layer: Option<&str>) -> Result<Picture, Fault> {
+/// The channels of a layer, and the names of all layers in the file.
+fn read_layer(path: &Path, layer: Option<&str>) -> Result<(Picture, Vec<String>), Fault> {
     let picture = read_picture(path).map_err(|e| Fault::Input(e.to_string()))?;
+    let layers: Vec<String> = picture.layers().into_iter().filter(|l| !l.is_empty()).collect();
     let wanted = layer.unwrap_or("");
-    picture.layer(wanted).ok_or_else(|| {
-        let named: Vec<String> = picture.layers().into_iter().filter(|l| !l.is_empty()).collect();
-        let what = if wanted.is_empty() { "no plain channels".to_owned() } else { format!("no layer `{wanted}`") };
-        let has = if named.is_empty() { format!("the channels {}", picture.names.join(", ")) } else { format!("the layers {}", named.join(", ")) };
-        Fault::Input(format!("`{}` has {what}, but {has}", path.display()))
-    })
+    match picture.layer(wanted) {
+        Some(found) => Ok((found, layers)),
+        None if wanted.is_empty() => {
+            Err(Fault::Input(format!("`{}` has no plain channels, only the layers {}", path.display(), layers.join(", "))))
+        }
+        None => Err(Fault::Input(format!("`{}` has no layer `{wanted}`; its channels are {}", path.display(), picture.names.join(", ")))),
+    }
 }
 
 fn text(metrics: &Metrics) -> String {

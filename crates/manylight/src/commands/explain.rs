@@ -1,13 +1,14 @@
 //! `manylight explain`: a line a node: what will run, what will not, and why.
 
 use manylight::{
+    Settings,
     fault::Fault,
     graph::plan::{Idle, Lifetime, Plan, PlanNode, Target},
     graph::registry::Direction,
 };
 use serde_json::json;
 
-use super::session::{Session, Setup};
+use super::session::Session;
 use crate::cli::{Cli, ExplainArgs, TextOrJson};
 
 /// A line of the explanation.
@@ -23,8 +24,8 @@ struct Line {
 pub fn run(cli: &Cli, args: &ExplainArgs) -> Result<(), Fault> {
     let session = Session::open(cli, &args.pipeline.pipeline)?;
     let scene = session.scene(&args.scene)?;
-    let setup = Setup { size: args.size.size, set: args.pipeline.set.clone(), ..Setup::default() };
-    let plan = session.plan(Some(&scene), &setup)?;
+    let settings = Settings { size: args.size.size, set: args.pipeline.set.clone(), ..Settings::default() };
+    let plan = session.plan(Some(&scene), &settings)?;
     let lines = lines(&plan);
     match args.format {
         TextOrJson::Text => super::print(&text(&lines)),
@@ -33,7 +34,7 @@ pub fn run(cli: &Cli, args: &ExplainArgs) -> Result<(), Fault> {
                 .iter()
                 .map(|l| json!({"id": l.id, "state": l.state, "reason": l.reason, "node": l.node, "stage": l.stage}))
                 .collect();
-            super::print(&format!("{:#}\n", json!({"pipeline": session.pipeline.name, "nodes": nodes})))
+            super::print(&format!("{:#}\n", json!({"pipeline": session.pipeline().name, "nodes": nodes})))
         }
     }
 }

@@ -46,7 +46,8 @@ const MESH: Shape = Shape { what: "a mesh", required: &["file"], optional: &["na
 const TRANSFORM: Shape = Shape { what: "a transform", required: &[], optional: &["translate", "rotate_deg", "scale"] };
 const TRANSFORM_KEY: Shape = Shape { what: "a key frame of an object", required: &["time"], optional: TRANSFORM.optional };
 const CAMERA: Shape = Shape { what: "a camera", required: &["origin", "target"], optional: &["up", "fov_x_deg", "motion", "repeat"] };
-const CAMERA_KEY: Shape = Shape { what: "a key frame of a camera", required: &["time"], optional: &["origin", "target", "up", "fov_x_deg"] };
+const CAMERA_KEY: Shape =
+    Shape { what: "a key frame of a camera", required: &["time"], optional: &["origin", "target", "up", "fov_x_deg"] };
 const SPOT: Shape = Shape {
     what: "a spot light",
     required: &["position", "target", "intensity", "beam_deg", "cutoff_deg"],
@@ -73,7 +74,8 @@ pub(super) fn read(reader: &mut Reader, tree: &Tree) -> Document {
         document.meshes = list.iter().filter_map(|tree| read_mesh(reader, tree)).collect();
     }
     document.camera = fields.get("camera").and_then(|tree| read_camera(reader, tree));
-    document.lights = fields.get("lights").map(|tree| reader.list(tree, "lights").iter().filter_map(|tree| read_light(reader, tree)).collect());
+    document.lights =
+        fields.get("lights").map(|tree| reader.list(tree, "lights").iter().filter_map(|tree| read_light(reader, tree)).collect());
     if let Some(tree) = fields.get("materials") {
         let entries = reader.map(tree, "materials");
         document.materials = entries.into_iter().filter_map(|(name, tree)| read_material(reader, name, tree)).collect();
@@ -195,7 +197,11 @@ fn read_light(reader: &mut Reader, tree: &Tree) -> Option<Light> {
     if let (Some(beam), Some((cutoff, tree))) = (beam, cutoff)
         && cutoff <= beam
     {
-        reader.error(&tree.range, format!("the cut-off {cutoff}° is not above the beam {beam}°"), "both are half-angles; the light fades between them");
+        reader.error(
+            &tree.range,
+            format!("the cut-off {cutoff}° is not above the beam {beam}°"),
+            "both are half-angles; the light fades between them",
+        );
     }
     let falloff = fields.get("falloff").map_or(Some(Falloff::Linear), |tree| read_falloff(reader, tree));
     let motion = read_motion(reader, &fields, |reader, tree| {
@@ -243,7 +249,8 @@ fn read_material(reader: &mut Reader, name: Spanned, tree: &Tree) -> Option<Mate
     let specular = fields.get("specular").and_then(|tree| albedo(reader, tree));
     let shininess = fields.get("shininess").and_then(|tree| checked(reader, tree, |n| (n < 0.0).then_some("an exponent is at least 0")));
     let texture = fields.get("texture").and_then(|tree| reader.text(tree, "a file"));
-    if [diffuse, specular].iter().all(Option::is_none) && shininess.is_none() && texture.is_none() && matches!(&tree.kind, Kind::Tuple(..)) {
+    if [diffuse, specular].iter().all(Option::is_none) && shininess.is_none() && texture.is_none() && matches!(&tree.kind, Kind::Tuple(..))
+    {
         let span = name.span.clone();
         reader.out.push(Diagnostic::warning(format!("nothing of `{}` is changed", name.text), span).help("give `diffuse`, `specular`, …"));
     }

@@ -13,7 +13,7 @@ use manylight_graph::{
 
 use crate::{
     bounds::Bounds,
-    files::{FileReader, Files, beside, cannot_read, plain},
+    files::{FileReader, Files, beside, cannot_read, without_dots},
     fit,
     import::{Material, Mesh, TextureSet, import_obj, nowhere},
     motion::{Pose, Track},
@@ -24,16 +24,31 @@ use document::{Document, MaterialEntry, MeshEntry};
 
 /// Loads a scene file, or a mesh as a scene of its own.
 pub(crate) fn load(path: &Path, reader: &dyn FileReader) -> Result<Scene, Diagnostics> {
-    let path = &plain(path);
-    let mut loader = Loader { files: Files::new(reader), meshes: Vec::new(), materials: Vec::new(), textures: TextureSet::default(), out: Diagnostics::default() };
-    let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
+    let path = &without_dots(path);
+    let mut loader = Loader {
+        files: Files::new(reader),
+        meshes: Vec::new(),
+        materials: Vec::new(),
+        textures: TextureSet::default(),
+        out: Diagnostics::default(),
+    };
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    if extension.is_some_and(|extension| extension == "obj") {
-        let mesh = loader.mesh(path).map_err(|fault| Diagnostics(vec![fault]))?;
-        return loader.finish(stem.clone(), Document::default(), vec![(stem, mesh, Track::fixed(Pose::default()))]);
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+    match extension.as_deref() {
+        Some("obj") => {
+            let mesh = loader.mesh(path).map_err(|fault| Diagnostics(vec![fault]))?;
+            loader.finish(stem.clone(), Document::default(), vec![(stem, mesh, Track::fixed(Pose::default()))])
+        }
+        Some("ron") | None => loader.scene(path, stem),
+        Some(other) => {
+            let message = format!("cannot load `{}`: a scene is a `.ron` or an `.obj` file, not `.{other}`", path.display());
+            Err(Diagnostics(vec![Diagnostic::error_nowhere(message).help("export the mesh as Wavefront OBJ")]))
+        }
     }
-    loader.scene(path, stem)
 }
+
+/// What to write in an empty file.
+const EXAMPLE: &str = "the least scene is `Scene(meshes: [\"mesh.obj\"])`";
 
 /// What is loaded so far.
 struct Loader<'a> {
@@ -57,7 +72,15 @@ impl Loader<'_> {
         };
         let source = Arc::new(Source { name: path.display().to_string(), path: Some(path.to_owned()), text: text.into() });
         let (mut reader, tree) = Reader::open(&source);
-        let document = tree.map(|tree| document::read(&mut reader, &tree)).unwrap_or_default();
+        let document = match tree {
+            Some(tree) => document::read(&mut reader, &tree),
+            None => {
+                // A fault of no length is that of an empty file, for which the reader knows no example.
+                let empty = |fault: &&mut Diagnostic| fault.labels.iter().any(|label| label.span.range.is_empty());
+                reader.out.iter_mut().filter(empty).for_each(|fault| fault.help = Some(EXAMPLE.into()));
+                Document::default()
+            }
+        };
         self.out.0.append(&mut reader.out);
 
         let mut objects = Vec::new();
@@ -68,7 +91,9 @@ impl Loader<'_> {
                     let stem = Path::new(&file.text).file_stem().unwrap_or_default().to_string_lossy();
                     objects.push((name.clone().unwrap_or_else(|| stem.into_owned()), mesh, pose.clone()));
                 }
-                Err(fault) => self.out.0.push(Diagnostic { labels: vec![Label { span: file.span.clone(), message: String::new() }], ..fault }),
+                Err(fault) => {
+                    self.out.0.push(Diagnostic { labels: vec![Label { span: file.span.clone(), message: String::new() }], ..fault })
+                }
             }
         }
         if objects.len() == document.meshes.len() && !objects.is_empty() {
@@ -130,18 +155,25 @@ impl Loader<'_> {
         let camera = document.camera.unwrap_or_else(|| {
             let camera = fit::camera(&bounds);
             let message = format!("the scene has no camera: it is seen from {} towards {}", camera.origin, camera.target);
-            self.out.0.push(nowhere(message).help("write `camera: (origin: (x, y, z), target: (x, y, z), fov_x_deg: 50.0)` in a scene file"));
+            self.out
+                .0
+                .push(nowhere(message).help("write `camera: (origin: (x, y, z), target: (x, y, z), fov_x_deg: 50.0)` in a scene file"));
             Track::fixed(camera)
         });
         let lights: Vec<Light> = document.lights.unwrap_or_else(|| {
             let light = fit::light(&bounds);
             let pose = light.pose.at(0.0);
-            let message = format!("the scene has no light: a spot of {:.4} W/sr shines from {} to {}", pose.intensity.x, pose.position, pose.target);
-            self.out.0.push(nowhere(message).help("write `lights: [Spot(position: …, target: …, intensity: …, beam_deg: …, cutoff_deg: …)]`"));
+            let message =
+                format!("the scene has no light: a spot of {:.4} W/sr shines from {} to {}", pose.intensity.x, pose.position, pose.target);
+            self.out
+                .0
+                .push(nowhere(message).help("write `lights: [Spot(position: …, target: …, intensity: …, beam_deg: …, cutoff_deg: …)]`"));
             vec![light]
         });
         if lights.is_empty() {
-            self.out.0.push(nowhere("the scene has an empty list of lights: its picture is black").help("leave `lights` out to have one fitted"));
+            self.out
+                .0
+                .push(nowhere("the scene has an empty list of lights: its picture is black").help("leave `lights` out to have one fitted"));
         }
         let Self { files, meshes, materials, textures, out } = self;
         let Files { seen: sources, hash, .. } = files;

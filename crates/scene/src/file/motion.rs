@@ -51,7 +51,9 @@ pub(super) fn read_motion<T>(
         {
             let (fault, place) = (reader.span(&head(tree)), reader.span(place));
             let message = format!("the time {time} does not come after {before}");
-            reader.out.push(Diagnostic::error(message, fault).and(place, "the key before").help("put the keys in the order of their times"));
+            reader
+                .out
+                .push(Diagnostic::error(message, fault).and(place, "the key before").help("put the keys in the order of their times"));
             continue;
         }
         keys.push((time, value, head(tree)));

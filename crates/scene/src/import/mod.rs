@@ -9,8 +9,8 @@ mod obj_text;
 mod texture;
 
 pub(crate) use faults::nowhere;
-pub(crate) use mesh::{area, edges};
 pub use mesh::{Mesh, MeshStatistics, MeshTriangle};
+pub(crate) use mesh::{area, edges};
 pub(crate) use obj::import_obj;
 pub(crate) use texture::TextureSet;
 pub use texture::{MAX_TEXTURE_SIZE, Textures};

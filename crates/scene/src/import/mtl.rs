@@ -142,4 +142,3 @@ fn without_options(text: &str) -> &str {
     }
     rest
 }
-

@@ -72,13 +72,12 @@ const NO_MATERIAL: u32 = u32::MAX;
 fn parse(clean: &CleanObj) -> Result<(Vec<Vertex>, Vec<MeshTriangle>), tobj::LoadError> {
     let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
     let count = clean.materials.len();
-    // The parser takes its materials from a library: one that has them all, by number.
-    let text = format!("mtllib all\n{}", clean.text);
+    // The parser takes its materials from the library `all`: it has them by number.
     let library = |_: &Path| -> tobj::MTLLoadResult {
         let names = (0..count).map(|i| (i.to_string(), i)).collect();
         Ok((vec![tobj::Material::default(); count], names))
     };
-    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, library)?;
+    let (models, _) = tobj::load_obj_buf(&mut clean.text.as_bytes(), &options, library)?;
     let mut vertices = Vec::new();
     let mut triangles = Vec::new();
     for tobj::Model { mesh, .. } in models {

@@ -1,7 +1,7 @@
 //! Mends the text of an OBJ file, so that the parser neither gives up nor misreads it.
 //!
 //! What comes out has only `v`, `vt`, `vn`, `f` and `usemtl` lines with valid numbers; every corner of every face has all three indices,
-//! absolute and in range (index 1 of `vt` and `vn` is a zero put in front for corners without one); materials are numbered.
+//! absolute and in range (index 1 of `vt` and `vn` is a zero put in front for corners without one); materials are numbered, and the only library is `all`.
 
 use std::{borrow::Cow, collections::HashMap, fmt::Write, ops::Range};
 
@@ -32,7 +32,7 @@ type Counts = [usize; 3];
 pub(super) fn clean(text: &str) -> CleanObj {
     let totals = count(text);
     let mut out = CleanObj { text: String::with_capacity(text.len() + text.len() / 2), ..CleanObj::default() };
-    out.text.push_str("vt 0 0\nvn 0 0 0\n");
+    out.text.push_str("mtllib all\nvt 0 0\nvn 0 0 0\n");
     let mut counts = [0; 3];
     for (line, place) in logical_lines(text) {
         let mut words = line.split_whitespace();
@@ -80,7 +80,7 @@ fn logical_lines(text: &str) -> impl Iterator<Item = (Cow<'_, str>, Range<usize>
         loop {
             let rest = text.get(offset..).filter(|rest| !rest.is_empty());
             let Some(rest) = rest else {
-                return (offset > start).then(|| (joined, start..offset));
+                return (offset > start).then_some((joined, start..offset));
             };
             let line = rest.split_inclusive('\n').next().unwrap_or(rest);
             offset += line.len();

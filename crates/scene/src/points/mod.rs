@@ -15,9 +15,9 @@ use glam::DVec3;
 
 use crate::{
     gpu_data::ScenePoint,
+    import::{Mesh, MeshTriangle},
     random::{hash2, shuffle},
     scene::{Scene, SceneObject},
-    import::{Mesh, MeshTriangle},
 };
 
 pub use tessellation::Smoothness;
@@ -25,7 +25,7 @@ pub use tessellation::Smoothness;
 /// How points are spread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PointMethod {
-    /// As many points on each triangle as its tessellation gives ([ACRSM] eq. 5.3, 5.4 and algorithm 5.2).
+    /// As many points on each triangle as its tessellation gives (ACRSM eq. 5.3, 5.4 and algorithm 5.2).
     ///
     /// Algorithm 5.2 walks over a triangle in steps of barycentric coordinates. Its walk leaves out one edge and repeats corners, so here it only
     /// gives the **number** of points; they are spread over the whole triangle, stratified. Each stands for an equal share of it.

@@ -1,0 +1,97 @@
+//! Checks a pipeline without a scene and without a GPU, for every option of every parameter.
+
+use std::{collections::BTreeMap, path::Path};
+
+use crate::{
+    assign::Values,
+    diagnostics::{Diagnostic, Diagnostics, Severity},
+    features,
+    library::Library,
+    pipeline::{Gaps, Pipeline},
+    plan::PlanInput,
+    planner::Planner,
+    registry::Registry,
+    resolve::{Linked, link},
+    unused,
+    value::{ParamKind, Value},
+};
+
+/// The picture's size that sizes are checked with.
+const OUTPUT: (u32, u32) = (1920, 1080);
+
+/// Everything that can be known without a scene: names, types, connections, cycles and sizes, for the defaults and for every option of every
+/// choice and both values of every switch, one at a time, with and without what a scene may have.
+pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
+    let mut out = Vec::new();
+    let linked = link(pipeline, registry, features::KNOWN.to_vec(), &mut out);
+    let values = Values::assign(&linked, &[], &mut out);
+    let mut known: Vec<Diagnostic> = Vec::new();
+    let all = |on: bool| -> BTreeMap<String, bool> { features::KNOWN.iter().map(|f| ((*f).to_owned(), on)).collect() };
+    let (none, every) = (all(false), all(true));
+
+    let mut attempt = |values: &Values<'_>, features: &BTreeMap<String, bool>, when: &str| {
+        for fault in faults(&linked, values, features) {
+            // One cause shows in many variants: it is told once, with the first variant that has it.
+            let same = |other: &Diagnostic| other.labels.first().map(|l| &l.span) == fault.labels.first().map(|l| &l.span) && kind(other) == kind(&fault);
+            if known.iter().any(same) {
+                continue;
+            }
+            known.push(fault.clone());
+            out.push(if when.is_empty() { fault } else { Diagnostic { message: format!("{} ({when})", fault.message), ..fault } });
+        }
+    };
+    attempt(&values, &every, "");
+    attempt(&values, &none, "when the scene has no special features");
+    for name in features::KNOWN {
+        let mut one = none.clone();
+        one.insert((*name).to_owned(), true);
+        attempt(&values, &one, &format!("when the scene has only `{name}`"));
+    }
+    for (name, param) in &pipeline.params {
+        let current = values.get(name).cloned();
+        for value in variants(&param.kind).into_iter().filter(|v| Some(v) != current.as_ref()) {
+            let when = format!("when `{name}` is `{value}`");
+            let mut changed = values.clone();
+            changed.replace(name, value);
+            attempt(&changed, &every, &when);
+            attempt(&changed, &none, &when);
+        }
+    }
+    if pipeline.gaps == Gaps::default() && !out.iter().any(|d| d.severity == Severity::Error) {
+        out.extend(unused::find(&linked));
+    }
+    Diagnostics(out).sorted()
+}
+
+/// Reads a pipeline and checks it: all faults of its text and of its meaning at once.
+/// `path` is a file on disk, a path of the library, or a name in `pipelines/`.
+pub fn check_file(library: &Library, path: impl AsRef<Path>, registry: &Registry) -> Diagnostics {
+    let (pipeline, mut faults) = Pipeline::load_with_gaps(library, path.as_ref());
+    if let Some(pipeline) = pipeline {
+        faults.extend(check(&pipeline, registry));
+    }
+    faults.sorted()
+}
+
+/// The sentence without the values in it.
+fn kind(fault: &Diagnostic) -> &str {
+    fault.message.split(": ").next().unwrap_or("")
+}
+
+/// The values to try besides the default; numbers are tried at both ends of their range.
+fn variants(kind: &ParamKind) -> Vec<Value> {
+    match kind {
+        ParamKind::Bool { .. } => vec![Value::Bool(false), Value::Bool(true)],
+        ParamKind::Choice { options, .. } => options.iter().cloned().map(Value::Choice).collect(),
+        ParamKind::Int { min, max, .. } => vec![Value::Int(*min), Value::Int(*max)],
+        ParamKind::Float { .. } => Vec::new(),
+    }
+}
+
+fn faults(linked: &Linked<'_>, values: &Values<'_>, features: &BTreeMap<String, bool>) -> Vec<Diagnostic> {
+    let mut out = Vec::new();
+    let input = PlanInput { output: OUTPUT, features: features.clone(), ..PlanInput::default() };
+    // Values hold names of the same pipeline; a plan is made only for its faults.
+    let _ = Planner { linked, values, input: &input, out: &mut out }.run();
+    out
+}

@@ -1,0 +1,407 @@
+//! Makes a plan: which nodes run, in what order, on what memory, with what sizes.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use petgraph::graph::{EdgeIndex, NodeIndex};
+
+use crate::{
+    assign::Values,
+    diagnostics::{Diagnostic, Diagnostics, Severity, Span},
+    order::{self, Dag},
+    pipeline::Pipeline,
+    plan::{Idle, IdleNode, Lifetime, Plan, PlanInput, PlanNode, PlanResource, Target, Usage},
+    registry::{Direction, Registry, Step},
+    render::suggest,
+    resolve::{Linked, Wire, link},
+    sizes::{LARGEST_SIDE, Sizes},
+    slots,
+    steps::{self, NodeScope},
+};
+
+/// Plans a frame.
+///
+/// # Errors
+/// Everything that is wrong with the pipeline, the values set, or the sizes that come of them.
+pub fn plan(pipeline: &Pipeline, registry: &Registry, input: &PlanInput) -> Result<Plan, Diagnostics> {
+    let mut out = Vec::new();
+    let (width, height) = input.output;
+    if width == 0 || height == 0 || u64::from(width.max(height)) > LARGEST_SIDE {
+        let fault = Diagnostic::error_nowhere(format!("a picture of {width}×{height} pixels cannot be rendered"));
+        return Err(fault.help(format!("sides are 1 to {LARGEST_SIDE} pixels")).into());
+    }
+    let linked = link(pipeline, registry, input.features.keys().map(String::as_str).collect(), &mut out);
+    for node in linked.nodes.iter().filter(|n| registry.faulty.contains(&n.usage.node.text)) {
+        let name = &node.usage.node.text;
+        let fault = Diagnostic::error(format!("the node `{name}` cannot be used: its declaration or shader has faults"), node.usage.node.span.clone());
+        out.push(fault.help("mend those first; `check` shows them"));
+    }
+    let values = Values::assign(&linked, &input.set, &mut out);
+    let plan = Planner { linked: &linked, values: &values, input, out: &mut out }.run();
+    let faults = Diagnostics(out).sorted();
+    match plan {
+        Some(plan) if !faults.has_errors() => Ok(plan),
+        _ if faults.has_errors() => Err(faults),
+        _ => Err(Diagnostic::error_nowhere(format!("the pipeline `{}` cannot be planned", pipeline.name)).into()),
+    }
+}
+
+/// An edge of the graph: the consumer's document index and where it names the resource.
+#[derive(Debug, Clone, Copy)]
+struct Read<'a> {
+    resource: &'a str,
+    span: &'a Span,
+}
+
+pub(crate) struct Planner<'a, 'p> {
+    pub linked: &'p Linked<'a>,
+    pub values: &'p Values<'a>,
+    pub input: &'p PlanInput,
+    pub out: &'p mut Vec<Diagnostic>,
+}
+
+/// What conditions leave: who is on and who writes what.
+struct Activity<'a> {
+    /// Reason for being off, by node.
+    off: Vec<Option<String>>,
+    /// The node that writes a resource.
+    producer: BTreeMap<&'a str, usize>,
+}
+
+impl<'a> Planner<'a, '_> {
+    /// The plan, if it can be made; what is in the way goes to `out`.
+    pub fn run(mut self) -> Option<Plan> {
+        let before = self.out.iter().filter(|d| d.severity == Severity::Error).count();
+        let activity = self.activity();
+        let dag = self.dag(&activity);
+        let cyclic = self.cycles(&dag);
+        let live = self.live(&activity);
+        let runs = if self.input.debug.no_culling { self.runnable(&activity, &live) } else { live };
+        let mut sizes = Sizes::new(self.linked, self.values, self.input);
+        let plan = self.assemble(&activity, &dag, &runs, &mut sizes);
+        let faults = self.out.iter().filter(|d| d.severity == Severity::Error).count();
+        if cyclic || faults > before { None } else { plan }
+    }
+
+    fn activity(&mut self) -> Activity<'a> {
+        let get = |name: &str| self.values.get(name).cloned();
+        let off: Vec<Option<String>> = self
+            .linked
+            .nodes
+            .iter()
+            .map(|node| {
+                let verdict = node.usage.when.as_ref()?.eval(&get, &self.input.features);
+                (!verdict.holds).then_some(verdict.why)
+            })
+            .collect();
+        let mut producer: BTreeMap<&'a str, usize> = BTreeMap::new();
+        for (index, node) in self.linked.nodes.iter().enumerate().filter(|(index, _)| off[*index].is_none()) {
+            for (_, port, wire) in node.ports() {
+                let (Direction::Output, Wire::Resource { name, span, .. }) = (port.direction, wire) else { continue };
+                match producer.get(name) {
+                    Some(other) if *other != index => {
+                        let other = &self.linked.nodes[*other].usage.id;
+                        self.out.push(
+                            Diagnostic::error(format!("`{name}` is written by two nodes: `{}` and `{}`", other.text, node.usage.id.text), span.clone())
+                                .and(other.span.clone(), "the other one")
+                                .help("give them conditions that exclude each other, or resources of their own"),
+                        );
+                    }
+                    _ => {
+                        producer.insert(name, index);
+                    }
+                }
+            }
+        }
+        Activity { off, producer }
+    }
+
+    /// Resources that a node reads, with the last frame's told apart.
+    fn reads(&self, node: usize) -> impl Iterator<Item = (&'a str, bool, bool, &'a Span)> + use<'a> {
+        let reads: Vec<_> = self.linked.nodes[node]
+            .ports()
+            .filter_map(|(_, port, wire)| match (port.direction, wire) {
+                (Direction::Input, Wire::Resource { name, previous, span }) => Some((name, previous, port.optional, span)),
+                _ => None,
+            })
+            .collect();
+        reads.into_iter()
+    }
+
+    fn dag(&self, activity: &Activity<'a>) -> Dag<Read<'a>> {
+        let mut dag = Dag::with_capacity(self.linked.nodes.len(), self.linked.nodes.len() * 4);
+        for index in 0..self.linked.nodes.len() {
+            dag.add_node(index);
+        }
+        for (index, _) in activity.off.iter().enumerate().filter(|(_, off)| off.is_none()) {
+            for (resource, previous, _, span) in self.reads(index) {
+                if let (false, Some(from)) = (previous, activity.producer.get(resource)) {
+                    dag.update_edge(NodeIndex::new(*from), NodeIndex::new(index), Read { resource, span });
+                }
+            }
+        }
+        dag
+    }
+
+    fn cycles(&mut self, dag: &Dag<Read<'a>>) -> bool {
+        let cycles = order::cycles(dag);
+        for cycle in &cycles {
+            let id = |n: NodeIndex| self.linked.nodes[dag[n]].usage.id.text.as_str();
+            let next = |at: usize| cycle[(at + 1) % cycle.len()];
+            let edge = |at: usize| -> Option<Read<'a>> {
+                let edge: EdgeIndex = dag.find_edge(cycle[at], next(at))?;
+                dag.edge_weight(edge).copied()
+            };
+            let names: Vec<&str> = (0..=cycle.len()).map(|at| id(cycle[at % cycle.len()])).collect();
+            let message = if cycle.len() == 1 {
+                format!("node `{}` reads what it writes itself", names[0])
+            } else {
+                format!("nodes wait for each other in a cycle: {}", names.join(" → "))
+            };
+            let mut labels = (0..cycle.len()).filter_map(|at| edge(at).map(|read| (at, read)));
+            let Some((at, first)) = labels.next() else { continue };
+            let say = |at: usize, read: &Read<'_>| format!("`{}` reads `{}`, which `{}` writes", id(next(at)), read.resource, id(cycle[at]));
+            let mut fault = Diagnostic::error(message, first.span.clone()).at(say(at, &first));
+            for (at, read) in labels {
+                fault = fault.and(read.span.clone(), say(at, &read));
+            }
+            self.out.push(fault.help("read the last frame's value with Previous(\"…\") in one place, or write to another resource"));
+        }
+        !cycles.is_empty()
+    }
+
+    /// Nodes that feed what is shown or kept. Reading what nobody writes is a fault for these.
+    fn live(&mut self, activity: &Activity<'a>) -> BTreeSet<usize> {
+        let mut wanted: Vec<usize> = Vec::new();
+        let pipeline = self.linked.pipeline;
+        let shown = [Some(&pipeline.presents), pipeline.radiance.as_ref()];
+        for name in shown.into_iter().flatten() {
+            match activity.producer.get(name.text.as_str()) {
+                Some(node) => wanted.push(*node),
+                None => self.unproduced(&name.text, &name.span, "", activity),
+            }
+        }
+        for name in &self.input.keep {
+            if !pipeline.resources.contains_key(name) {
+                let help = suggest(name, pipeline.resources.keys().map(String::as_str));
+                self.out.push(Diagnostic::error_nowhere(format!("the pipeline `{}` has no resource `{name}`", pipeline.name)).help(help));
+            } else if let Some(node) = activity.producer.get(name.as_str()) {
+                wanted.push(*node);
+            } else {
+                let why = self.producers_off(name, activity);
+                self.out.push(Diagnostic::error_nowhere(format!("`{name}` is not written in this frame{why}")).help("set the parameters so that it is"));
+            }
+        }
+        let mut live = BTreeSet::new();
+        let mut said = BTreeSet::new();
+        while let Some(node) = wanted.pop() {
+            if !live.insert(node) {
+                continue;
+            }
+            for (resource, _, optional, span) in self.reads(node) {
+                match activity.producer.get(resource) {
+                    Some(from) => wanted.push(*from),
+                    None if optional => {}
+                    None => {
+                        if said.insert((node, resource)) {
+                            let id = &self.linked.nodes[node].usage.id.text;
+                            self.unproduced(resource, span, &format!("`{id}` reads it"), activity);
+                        }
+                    }
+                }
+            }
+        }
+        live
+    }
+
+    /// With culling off: live nodes, and all others that have what they need.
+    fn runnable(&self, activity: &Activity<'a>, live: &BTreeSet<usize>) -> BTreeSet<usize> {
+        let mut runs: BTreeSet<usize> = (0..self.linked.nodes.len()).filter(|n| activity.off[*n].is_none() && self.linked.nodes[*n].decl.is_some()).collect();
+        loop {
+            let lacking: Vec<usize> = runs
+                .iter()
+                .copied()
+                .filter(|n| !live.contains(n))
+                .filter(|n| self.reads(*n).any(|(r, _, optional, _)| !optional && activity.producer.get(r).is_none_or(|p| !runs.contains(p))))
+                .collect();
+            if lacking.is_empty() {
+                return runs;
+            }
+            lacking.iter().for_each(|n| {
+                runs.remove(n);
+            });
+        }
+    }
+
+    fn producers_off(&self, resource: &str, activity: &Activity<'a>) -> String {
+        let mut reasons = Vec::new();
+        for (index, node) in self.linked.nodes.iter().enumerate() {
+            let writes = node.ports().any(|(_, port, wire)| port.direction == Direction::Output && matches!(wire, Wire::Resource { name, .. } if name == resource));
+            if let (true, Some(why)) = (writes, &activity.off[index]) {
+                reasons.push(format!("node `{}`, which writes it, is off: {why}", node.usage.id.text));
+            }
+        }
+        if reasons.is_empty() { String::new() } else { format!(": {}", reasons.join("; ")) }
+    }
+
+    fn unproduced(&mut self, resource: &str, span: &Span, reader: &str, activity: &Activity<'a>) {
+        if self.linked.tainted.contains(resource) {
+            return;
+        }
+        let why = self.producers_off(resource, activity);
+        if why.is_empty() && self.linked.incomplete {
+            return;
+        }
+        let producers = self.linked.nodes.iter().filter(|node| {
+            node.usage.when.is_some() && node.ports().any(|(_, p, w)| p.direction == Direction::Output && matches!(w, Wire::Resource { name, .. } if name == resource))
+        });
+        let mut fault = Diagnostic::error(format!("`{resource}` is read, but not written in this frame{why}"), span.clone()).at(reader);
+        for node in producers {
+            if let Some(when) = &node.usage.when {
+                fault = fault.and(when.span.clone(), format!("the condition of `{}`", node.usage.id.text));
+            }
+        }
+        self.out.push(fault.help("give the reader the same condition, or let another node write it otherwise"));
+    }
+
+    fn assemble(&mut self, activity: &Activity<'a>, dag: &Dag<Read<'a>>, runs: &BTreeSet<usize>, sizes: &mut Sizes<'a, '_>) -> Option<Plan> {
+        let kept_dag = dag.filter_map(|_, n| runs.contains(n).then_some(*n), |_, e| Some(*e));
+        let order = order::sort(&kept_dag, self.input.debug.shuffle);
+        let mut table = Table::default();
+        // In the order of the documents, so that plans of one pipeline look alike.
+        let mut used: BTreeSet<&str> = BTreeSet::new();
+        for index in &order {
+            for (_, _, wire) in self.linked.nodes[*index].ports() {
+                match wire {
+                    Wire::Resource { name, .. } if activity.producer.get(name).is_some_and(|p| runs.contains(p)) => used.insert(name),
+                    Wire::External(name) => used.insert(name),
+                    _ => false,
+                };
+            }
+        }
+        let names = self.linked.pipeline.resources.keys().chain(self.linked.registry.externals.keys());
+        for name in names.map(String::as_str).filter(|n| used.contains(n)) {
+            if let Some(desc) = sizes.get(name, self.out) {
+                let external = !self.linked.pipeline.resources.contains_key(name);
+                table.add(name, desc, external);
+            }
+        }
+        let mut nodes = Vec::with_capacity(order.len());
+        for (position, index) in order.iter().enumerate() {
+            nodes.extend(self.node(*index, position, &mut table));
+        }
+        let presents = table.index.get(self.linked.pipeline.presents.text.as_str()).copied();
+        let radiance = self.linked.pipeline.radiance.as_ref().and_then(|r| table.index.get(r.text.as_str()).copied());
+        let slots = table.lifetimes(self.linked.pipeline, presents, radiance, &self.input.keep, !self.input.debug.no_reuse);
+        let idle = self.idle(activity, runs);
+        Some(Plan {
+            nodes,
+            idle,
+            resources: table.resources,
+            presents: presents?,
+            radiance,
+            params: self.values.pipeline.iter().map(|(n, v)| ((*n).to_owned(), v.clone())).collect(),
+            slots,
+        })
+    }
+
+    fn node(&mut self, index: usize, position: usize, table: &mut Table<'a>) -> Option<PlanNode> {
+        let linked = &self.linked.nodes[index];
+        let mut bindings = Vec::with_capacity(linked.wires.len());
+        let mut ports = BTreeMap::new();
+        for (port_name, port, wire) in linked.ports() {
+            let drawn = linked.decl.is_some_and(|d| {
+                d.steps.iter().any(|s| matches!(s, Step::Draw { targets, depth, .. } if targets.iter().any(|t| t == port_name) || depth.as_deref() == Some(port_name)))
+            });
+            let target = match wire {
+                Wire::Resource { name, previous, .. } => match table.index.get(name).copied() {
+                    Some(ix) if previous => {
+                        table.previous[ix] = true;
+                        Target::Previous(ix)
+                    }
+                    Some(ix) => {
+                        table.touch(ix, position);
+                        Target::Resource(ix)
+                    }
+                    None => Target::Absent,
+                },
+                Wire::External(name) => table.index.get(name).map_or(Target::Absent, |ix| Target::Resource(*ix)),
+                Wire::Absent | Wire::Faulty => Target::Absent,
+            };
+            if let Target::Resource(ix) | Target::Previous(ix) = target {
+                let resource = &mut table.resources[ix];
+                match port.direction {
+                    Direction::Input => resource.usage.read = true,
+                    Direction::Output if drawn => resource.usage.target = true,
+                    Direction::Output => {
+                        resource.usage.storage = true;
+                        // The neighbouring level is read while the other is written.
+                        resource.usage.read |= matches!(resource.desc, crate::value::ResourceDesc::Texture { mips, .. } if mips > 1);
+                    }
+                }
+                ports.insert(port_name, (ix, resource.desc.clone()));
+            }
+            bindings.push((port_name.to_owned(), target));
+        }
+        let params = self.values.of_node(linked);
+        let id = linked.usage.id.text.clone();
+        // Nodes without a declaration write nothing that is known, so none is live.
+        let decl = std::sync::Arc::clone(linked.decl?);
+        let steps = steps::unroll(&id, &NodeScope { decl: &decl, ports, params: &params, output: self.input.output }, self.out);
+        Some(PlanNode { id, stage: linked.usage.stage.clone(), decl, bindings, params, steps })
+    }
+
+    fn idle(&self, activity: &Activity<'a>, runs: &BTreeSet<usize>) -> Vec<IdleNode> {
+        let nodes = self.linked.nodes.iter().enumerate().filter(|(index, _)| !runs.contains(index));
+        nodes
+            .map(|(index, node)| IdleNode {
+                id: node.usage.id.text.clone(),
+                stage: node.usage.stage.clone(),
+                kind: node.usage.node.text.clone(),
+                reason: activity.off[index].clone().map_or(Idle::Dead, Idle::Off),
+            })
+            .collect()
+    }
+}
+
+/// Resources of the plan while it is made.
+#[derive(Default)]
+struct Table<'a> {
+    index: BTreeMap<&'a str, usize>,
+    resources: Vec<PlanResource>,
+    /// First and last node, where any.
+    lives: Vec<Option<(usize, usize)>>,
+    previous: Vec<bool>,
+}
+
+impl<'a> Table<'a> {
+    fn add(&mut self, name: &'a str, desc: crate::value::ResourceDesc, external: bool) {
+        self.index.insert(name, self.resources.len());
+        let lifetime = if external { Lifetime::External } else { Lifetime::Kept };
+        self.resources.push(PlanResource { name: name.to_owned(), desc, lifetime, usage: Usage::default() });
+        self.lives.push(None);
+        self.previous.push(false);
+    }
+
+    fn touch(&mut self, ix: usize, position: usize) {
+        let (first, last) = self.lives[ix].get_or_insert((position, position));
+        *first = (*first).min(position);
+        *last = (*last).max(position);
+    }
+
+    fn lifetimes(&mut self, pipeline: &Pipeline, presents: Option<usize>, radiance: Option<usize>, keep: &[String], reuse: bool) -> usize {
+        for (ix, resource) in self.resources.iter_mut().enumerate() {
+            if resource.lifetime == Lifetime::External {
+                continue;
+            }
+            let history = pipeline.resources.get(&resource.name).is_some_and(|r| r.history);
+            let shown = presents == Some(ix) || radiance == Some(ix);
+            resource.usage.read |= shown;
+            resource.lifetime = match self.lives[ix] {
+                _ if history && self.previous[ix] => Lifetime::History,
+                Some((first, last)) if !shown && !keep.contains(&resource.name) => Lifetime::Transient { first, last, slot: 0 },
+                _ => Lifetime::Kept,
+            };
+        }
+        slots::assign(&mut self.resources, reuse)
+    }
+}

@@ -1,0 +1,12 @@
+//! Tests of the crate from outside.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod good;
+mod invariants;
+mod kit;
+mod merging;
+mod nodes;
+mod pipelines;
+mod plans;
+mod reload;
+mod text;

@@ -1,0 +1,191 @@
+//! Plans: order, values, sizes, lives, switches.
+
+use manylight_graph::{
+    plan::{Debug, Idle, Lifetime, Plan, PlanInput, PlanStep, Target},
+    registry::{External, HostDecl, PortKind},
+    value::{ResourceDesc, Value},
+};
+
+use crate::kit::*;
+
+const FILE: &str = "pipelines/test.ron";
+
+fn ids(plan: &Plan) -> Vec<&str> {
+    plan.nodes.iter().map(|n| n.id.as_str()).collect()
+}
+
+fn set(pairs: &[(&str, &str)]) -> PlanInput {
+    PlanInput { set: pairs.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect(), ..input() }
+}
+
+fn param<'p>(plan: &'p Plan, id: &str, name: &str) -> &'p Value {
+    let node = plan.nodes.iter().find(|n| n.id == id).unwrap();
+    &node.params.iter().find(|(n, _)| n == name).unwrap().1
+}
+
+#[test]
+fn values_come_from_defaults_presets_and_the_user() {
+    let plan = try_plan(&files(), &input()).unwrap();
+    assert_eq!(param(&plan, "paint", "strength"), &Value::Float(0.5));
+    assert_eq!(param(&plan, "soft", "radius"), &Value::Int(3), "the pipeline's parameter of the same name");
+    assert_eq!(param(&plan, "show", "radius"), &Value::Int(1));
+    let files = with(FILE, "    params: {", "    set: {\"count\": 7, \"paint.mode\": \"mean\"},\n    params: {");
+    let plan = try_plan(&files, &set(&[("radius", "9"), ("show.radius", "11"), ("radius", "10")])).unwrap();
+    assert_eq!(param(&plan, "paint", "mode"), &Value::Choice("mean".into()));
+    assert_eq!(param(&plan, "soft", "radius"), &Value::Int(10), "later wins");
+    assert_eq!(param(&plan, "show", "radius"), &Value::Int(11));
+    assert_eq!(plan.params[1], ("count".to_owned(), Value::Int(7)));
+    let cells = plan.resource("cells").unwrap();
+    assert_eq!(plan.resources[cells].desc, ResourceDesc::Buffer { element: "Cell".into(), stride: 16, count: 14 });
+}
+
+#[test]
+fn wrong_values_of_the_user_name_range_and_options() {
+    let faults = try_plan(&files(), &set(&[("cont", "1"), ("count", "0"), ("kind", "plan"), ("blur", "maybe"), ("paint.strenth", "1"), ("radius", "1.5")])).unwrap_err();
+    assert_faults(&faults.render(), 6, &[
+        "the pipeline `test` has no parameter `cont`\n = help: did you mean `count`?",
+        "`0` is no value of `count`\n = help: it takes a whole number from 1 to 4096",
+        "`plan` is no value of `kind`\n = help: it takes one of `plain`, `masked`; did you mean `plain`?",
+        "`maybe` is no value of `blur`\n = help: it takes true or false",
+        "the node `paint` (draw/paint) has no parameter `strenth`\n = help: did you mean `strength`?",
+        "`1.5` is no value of `radius`",
+    ]);
+}
+
+#[test]
+fn draws_have_targets_and_vertices() {
+    let plan = try_plan(&files(), &set(&[("blur", "false")])).unwrap();
+    assert_eq!(ids(&plan), ["scene", "hard", "show"]);
+    let albedo = plan.resource("albedo").unwrap();
+    let step = PlanStep::Draw { vertex: "vs".into(), fragment: "fs".into(), vertices: 36, targets: vec![albedo], depth: plan.resource("depth") };
+    assert_eq!(plan.nodes[0].steps, [step]);
+    assert!(plan.resources[albedo].usage.target && plan.resources[albedo].usage.read && !plan.resources[albedo].usage.storage);
+    let reasons: Vec<_> = plan.idle.iter().map(|n| (n.id.as_str(), n.reason.clone())).collect();
+    assert_eq!(reasons, [("paint", Idle::Dead), ("pyramid", Idle::Dead), ("soft", Idle::Off("`blur` is off".into()))]);
+}
+
+#[test]
+fn kept_resources_keep_their_nodes_alive() {
+    let plan = try_plan(&files(), &PlanInput { keep: vec!["albedo".into()], ..input() }).unwrap();
+    assert_eq!(ids(&plan), ["scene", "paint", "pyramid", "soft", "show"]);
+    assert_eq!(plan.resources[plan.resource("albedo").unwrap()].lifetime, Lifetime::Kept);
+    let faults = try_plan(&files(), &PlanInput { keep: vec!["albdo".into()], ..input() }).unwrap_err();
+    assert_faults(&faults.render(), 1, &["the pipeline `test` has no resource `albdo`", "did you mean `albedo`?"]);
+    let files = with(FILE, "(id: \"scene\", node: \"draw/scene\",", "(id: \"scene\", node: \"draw/scene\", when: Not(IsOn(\"blur\")),");
+    let faults = try_plan(&files, &PlanInput { keep: vec!["albedo".into()], ..input() }).unwrap_err();
+    assert_faults(&faults.render(), 1, &["`albedo` is not written in this frame: node `scene`, which writes it, is off: `blur` is on"]);
+}
+
+#[test]
+fn transients_share_memory_when_their_lives_do_not_touch() {
+    // picture → blurred → result have equal descriptions; picture and result do not meet.
+    let files = with(FILE, "presents: \"result\"", "presents: \"last\"");
+    let files = edit(files, FILE, "\"result\": Texture", "\"last\": Texture(format: Rgba16Float, size: Output), \"result\": Texture");
+    let files = edit(files, FILE, "nodes: [", "nodes: [(id: \"end\", node: \"post/blur\", in: {\"source\": \"result\"}, out: {\"blurred\": \"last\"}),");
+    let plan = try_plan(&files, &input()).unwrap();
+    let slot = |plan: &Plan, name: &str| match plan.resources[plan.resource(name).unwrap()].lifetime {
+        Lifetime::Transient { slot, .. } => slot,
+        other => panic!("{name}: {other:?}"),
+    };
+    assert_eq!(slot(&plan, "picture"), slot(&plan, "result"));
+    assert_ne!(slot(&plan, "picture"), slot(&plan, "blurred"));
+    assert_eq!(plan.slots, 4);
+    let own = try_plan(&files, &PlanInput { debug: Debug { no_reuse: true, ..Debug::default() }, ..input() }).unwrap();
+    assert_ne!(slot(&own, "picture"), slot(&own, "result"));
+    assert_eq!(own.slots, 5);
+}
+
+#[test]
+fn history_lives_on() {
+    let files = with(FILE, "in: {\"source\": \"picture\", \"mask\": \"pyramid\"}", "in: {\"source\": Previous(\"result\")}");
+    let files = edit(files, FILE, "size: Like(\"blurred\")", "size: Like(\"blurred\"), history: true");
+    let plan = try_plan(&files, &input()).unwrap();
+    let result = plan.resource("result").unwrap();
+    assert_eq!(plan.resources[result].lifetime, Lifetime::History);
+    assert_eq!(ids(&plan), ["soft", "show"]);
+    assert_eq!(plan.nodes[0].bindings[0], ("source".into(), Target::Previous(result)));
+    // Nobody reads the last frame: an ordinary resource.
+    let files = with(FILE, "\"cells\": Buffer(", "\"cells\": Buffer(history: true, ");
+    let plan = try_plan(&files, &input()).unwrap();
+    assert!(matches!(plan.resources[plan.resource("cells").unwrap()].lifetime, Lifetime::Transient { .. }));
+}
+
+#[test]
+fn an_optional_input_whose_producer_is_off_is_absent() {
+    let files = with(FILE, "(id: \"pyramid\", node: \"post/pyramid\")", "(id: \"pyramid\", node: \"post/pyramid\", when: AtLeast(\"count\", 200))");
+    let plan = try_plan(&files, &input()).unwrap();
+    assert_eq!(plan.nodes.iter().find(|n| n.id == "soft").unwrap().bindings[1], ("mask".into(), Target::Absent));
+    assert_eq!(plan.idle[1].reason, Idle::Off("`count` is 100, below 200".into()));
+}
+
+#[test]
+fn many_elements_fold_into_rows() {
+    let files = with(FILE, "\"count\": Int(min: 1, max: 4096", "\"count\": Int(min: 1, max: 4000000");
+    let plan = try_plan(&files, &set(&[("count", "3000000")])).unwrap();
+    assert_eq!(plan.nodes[0].steps[0], PlanStep::Compute { entry: "clear".into(), groups: [65535, 2, 1], mip: None });
+}
+
+#[test]
+fn sizes_beyond_the_limits_name_the_resource_and_the_remedy() {
+    let files = with(FILE, "\"count\": Int(min: 1, max: 4096", "\"count\": Int(min: 1, max: 1000000000");
+    let faults = try_plan(&files, &set(&[("count", "90000000")])).unwrap_err();
+    assert_faults(&faults.render(), 1, &["the buffer `cells` is too large: 180000000 elements", "test.ron:13:44", "lower the parameter `count` (now 90000000)"]);
+    let faults = try_plan(&crate::kit::files(), &PlanInput { output: (0, 4), ..input() }).unwrap_err();
+    assert_faults(&faults.render(), 1, &["a picture of 0×4 pixels cannot be rendered", "sides are 1 to 16384"]);
+    let faults = try_plan(&crate::kit::files(), &PlanInput { output: (20000, 4), ..input() }).unwrap_err();
+    assert_faults(&faults.render(), 1, &["a picture of 20000×4 pixels"]);
+    let plan = try_plan(&crate::kit::files(), &PlanInput { output: (1, 1), ..input() }).unwrap();
+    assert_eq!(plan.nodes[1].steps.len(), 1, "a pyramid of one texel has one level");
+}
+
+#[test]
+fn features_decide_and_must_be_known() {
+    let files = with(FILE, "when: Not(IsOn(\"blur\"))", "when: Not(Any([IsOn(\"blur\"), Feature(\"glossy\")]))");
+    let mut glossy = set(&[("blur", "false")]);
+    glossy.features.insert("glossy".into(), true);
+    let faults = try_plan(&files, &glossy).unwrap_err();
+    assert_faults(&faults.render(), 1, &["`blurred` is read, but not written in this frame", "the scene has `glossy`"]);
+    let faults = try_plan(&files, &PlanInput { features: [("textures".to_owned(), true)].into(), ..input() }).unwrap_err();
+    assert_faults(&faults.render(), 1, &["there is no scene feature `glossy`", "test.ron:24:141"]);
+}
+
+#[test]
+fn host_nodes_are_like_others() {
+    let ron = r#"Node(doc: "Points.", inputs: {"scene_triangles": Buffer(of: "u32", doc: "x")}, outputs: {"cells": Buffer(of: "Cell", doc: "x")},
+        params: {"seed": Int(min: 0, max: 9, default: 1, doc: "x")})"#;
+    let host = [HostDecl { name: "host/points", ron }];
+    let (registry, faults) = registry(&files(), &host);
+    assert!(faults.is_empty(), "{faults}");
+    let files = with(FILE, "(id: \"paint\", node: \"draw/paint\", in: {\"view\": \"scene_camera\"}, params: {\"strength\": 0.5})", "(id: \"points\", node: \"host/points\")");
+    let files = edit(files, FILE, "{\"source\": \"picture\", \"mask\": \"pyramid\"}", "{\"source\": \"albedo\", \"mask\": \"pyramid\"}");
+    let pipeline = manylight_graph::pipeline::Pipeline::load(&library(&files), "test").unwrap();
+    let plan = manylight_graph::planner::plan(&pipeline, &registry, &input()).unwrap();
+    let node = plan.nodes.iter().find(|n| n.id == "points").unwrap();
+    assert!(node.steps.is_empty() && node.decl.shader.is_none());
+    assert_eq!(node.bindings.len(), 2);
+    assert_eq!(node.params, [("seed".to_owned(), Value::Int(1))]);
+    let steps = "Node(doc: \"x\", steps: [])";
+    let faults = crate::kit::registry(&crate::kit::files(), &[HostDecl { name: "host/points", ron: steps }]).1;
+    assert_faults(&faults.render(), 1, &["a node written in Rust has no steps", "declaration of host/points:1:23"]);
+}
+
+#[test]
+fn a_faulty_node_is_not_also_unknown() {
+    let broken = with("shaders/post/pyramid.wgsl", "cells[0]", "cels[0]");
+    let (registry, faults) = registry(&broken, &[]);
+    assert_faults(&faults.render(), 1, &["`cels`", "pyramid.wgsl:10:51"]);
+    let library = library(&broken);
+    assert_faults(&manylight_graph::check::check_file(&library, "test", &registry).render(), 0, &[]);
+    let pipeline = manylight_graph::pipeline::Pipeline::load(&library, "test").unwrap();
+    let faults = manylight_graph::planner::plan(&pipeline, &registry, &input()).unwrap_err();
+    assert_faults(&faults.render(), 1, &["the node `post/pyramid` cannot be used: its declaration or shader has faults", "test.ron:22:31"]);
+}
+
+#[test]
+fn externals_have_the_layout_that_rust_fills() {
+    let mut externals = externals();
+    externals.push(External { name: "other_camera".into(), kind: PortKind::Uniform { of: "View".into() }, doc: String::new(), layout: None });
+    externals[0].layout = Some(manylight_graph::shader::Layout { size: 32, members: Vec::new() });
+    let (_, faults) = manylight_graph::registry::Registry::load(&library(&files()), &[], externals);
+    assert_faults(&faults.render(), 2, &["`View` differs from that of the external `scene_camera`: it has the member `origin` in addition", "paint.wgsl:7:8", "scene.wgsl:1:8"]);
+}

@@ -1,0 +1,215 @@
+//! `manylight profile`: what each node costs.
+
+use std::time::Instant;
+
+use manylight::{
+    fault::Fault,
+    files::{FileKind, check_writable},
+    renderer::Renderer,
+};
+use serde_json::json;
+
+use super::{
+    adapter_line, of_file,
+    session::{Session, of_render, settings, time_of},
+    stats::{self, FrameSamples, NodeSamples},
+    table::{Table, bytes},
+};
+use crate::{
+    cli::{Cli, ProfileArgs, TextOrJson},
+    progress,
+    samples::Samples,
+    trace::Trace,
+};
+
+/// Measures frames and prints a table.
+pub fn run(cli: &Cli, args: &ProfileArgs) -> Result<(), Fault> {
+    if let Some(file) = &args.trace {
+        check_writable(file).map_err(of_file)?;
+        if !matches!(FileKind::of(file), Ok(FileKind::Json)) {
+            return Err(Fault::Usage(format!("`{}`: --trace writes a .json file", file.display())));
+        }
+    }
+    let session = Session::open(cli, &args.pipeline.pipeline)?;
+    let scene = session.scene(&args.frame.scene)?;
+    let settings = settings(&args.pipeline, &args.frame, Vec::new());
+    session.plan(Some(&scene), &settings)?;
+    let gpu = super::open_gpu(args.frame.adapter.as_ref())?;
+    let mut renderer = session.renderer(&gpu, scene, settings)?;
+    for frame in 0..args.warm_up {
+        renderer.render_frame(time_of(&args.frame, frame.into())).map_err(of_render)?;
+        renderer.wait_timings();
+    }
+    let mut trace = args.trace.as_ref().map(|_| Trace::start()).transpose()?;
+    let samples = measure(&mut renderer, args, trace.as_mut())?;
+    if let (Some(trace), Some(file)) = (trace, &args.trace) {
+        trace.write(file)?;
+    }
+    match args.format {
+        TextOrJson::Text => super::print(&text(&renderer, args, &samples)),
+        TextOrJson::Json => super::print(&format!("{:#}\n", report(&renderer, args, &samples))),
+    }
+}
+
+fn measure(renderer: &mut Renderer, args: &ProfileArgs, mut trace: Option<&mut Trace>) -> Result<FrameSamples, Fault> {
+    let mut samples = FrameSamples::new(renderer.plan());
+    let bar = progress::bar(args.frames.into(), "measuring");
+    for frame in 0..u64::from(args.frames) {
+        let from_us = trace.as_ref().map_or(0.0, |t| t.now_us());
+        let start = Instant::now();
+        renderer.render_frame(time_of(&args.frame, u64::from(args.warm_up) + frame)).map_err(of_render)?;
+        let recorded = renderer.frame().index().wrapping_sub(1);
+        // Times of an older frame are no sample of this one.
+        let timings = renderer.wait_timings().filter(|t| t.frame == recorded);
+        samples.push(timings, start.elapsed().as_secs_f64() * 1e3);
+        if let (Some(trace), Some(timings)) = (&mut trace, timings) {
+            trace.gpu_frame(timings, from_us);
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(samples)
+}
+
+/// Nodes of one stage together: medians and percentiles are added, which is exact for medians only if the nodes vary alike.
+fn by_stage(samples: &FrameSamples) -> Vec<(String, Vec<&NodeSamples>)> {
+    let mut stages: Vec<(String, Vec<&NodeSamples>)> = Vec::new();
+    for node in &samples.nodes {
+        match stages.iter_mut().find(|(stage, _)| *stage == node.stage) {
+            Some((_, nodes)) => nodes.push(node),
+            None => stages.push((node.stage.clone(), vec![node])),
+        }
+    }
+    stages
+}
+
+fn sum(nodes: &[&NodeSamples], value: impl Fn(&NodeSamples) -> Option<f64>) -> Option<f64> {
+    nodes.iter().filter_map(|n| value(n)).reduce(|a, b| a + b)
+}
+
+/// Milliseconds of the node on the processor that does its work.
+fn cost(node: &NodeSamples) -> Option<f64> {
+    if node.host { node.cpu.median() } else { node.gpu.median() }
+}
+
+fn ms(value: Option<f64>) -> String {
+    value.map_or("no sample".to_owned(), |v| format!("{v:.3}"))
+}
+
+fn share(value: Option<f64>, total: Option<f64>) -> String {
+    match (value, total) {
+        (Some(value), Some(total)) if total > 0.0 => format!("{:.1} %", 100.0 * value / total),
+        _ => "-".to_owned(),
+    }
+}
+
+fn heading(renderer: &Renderer, args: &ProfileArgs) -> String {
+    let (width, height) = renderer.settings().size;
+    format!(
+        "{}, scene {}, {width} × {height}, {} frames after {} to warm up\nadapter: {}\n",
+        renderer.pipeline().name,
+        renderer.scene().name,
+        args.frames,
+        args.warm_up,
+        adapter_line(renderer.gpu()),
+    )
+}
+
+fn text(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> String {
+    let all: Vec<&NodeSamples> = samples.nodes.iter().collect();
+    let attributed = sum(&all, |n| n.gpu.median());
+    // Work of one pass may overlap the timestamps of another: what the nodes do not account for is shown, not hidden.
+    let rest = samples.gpu.median().zip(attributed).map(|(frame, nodes)| frame - nodes).filter(|rest| *rest > 0.0);
+    let total = sum(&all, cost).map(|nodes| nodes + rest.unwrap_or(0.0));
+    let columns = [("GPU median", false), ("GPU p95", false), ("share", false), ("CPU median", false), ("CPU p95", false)];
+    let times = |node: &NodeSamples| {
+        let gpu = |value: Option<f64>| if node.host { "on the host".to_owned() } else { ms(value) };
+        let (median, p95) = (gpu(node.gpu.median()), gpu(node.gpu.percentile(95.0)));
+        vec![median, p95, share(cost(node), total), ms(node.cpu.median()), ms(node.cpu.percentile(95.0))]
+    };
+    let mut nodes = Table::new(&[&[("node", true), ("stage", true)][..], &columns].concat());
+    for node in &samples.nodes {
+        nodes.row([vec![node.id.clone(), node.stage.clone()], times(node)].concat());
+    }
+    if rest.is_some() {
+        nodes.row(vec!["(between nodes)".to_owned(), String::new(), ms(rest), String::new(), share(rest, total)]);
+    }
+    let mut stages = Table::new(&[&[("stage", true), ("nodes", false)][..], &columns].concat());
+    for (stage, nodes) in by_stage(samples) {
+        let gpu = |value: fn(&NodeSamples) -> Option<f64>| {
+            if nodes.iter().all(|n| n.host) { "on the host".to_owned() } else { ms(sum(&nodes, value)) }
+        };
+        stages.row(vec![
+            stage,
+            nodes.len().to_string(),
+            gpu(|n| n.gpu.median()),
+            gpu(|n| n.gpu.percentile(95.0)),
+            share(sum(&nodes, cost), total),
+            ms(sum(&nodes, |n| n.cpu.median())),
+            ms(sum(&nodes, |n| n.cpu.percentile(95.0))),
+        ]);
+    }
+    let mut frame = Table::new(&[("frame", true), ("median", false), ("p95", false)]);
+    let mut row = |name: &str, s: &Samples| frame.row(vec![name.to_owned(), ms(s.median()), ms(s.percentile(95.0))]);
+    row("until the GPU is done", &samples.wall);
+    row("GPU, first pass to last", &samples.gpu);
+    row("CPU, record and submit", &samples.cpu);
+    let no_timestamps = if renderer.gpu().has_timestamps() { "" } else { "this adapter has no timestamps: GPU times are no sample\n" };
+    format!(
+        "{}{no_timestamps}\ntimes in milliseconds; CPU: to record\n{}\n{}\n{}\n{}",
+        heading(renderer, args),
+        nodes.render(),
+        stages.render(),
+        frame.render(),
+        memory_table(renderer)
+    )
+}
+
+fn memory_table(renderer: &Renderer) -> String {
+    let report = renderer.memory_report();
+    let mut table = Table::new(&[("resource", true), ("memory", false), ("held as", true)]);
+    for r in &report.resources {
+        table.row(vec![r.name.clone(), bytes(r.bytes), stats::holding(r.holding)]);
+    }
+    let shared = report.pool_unshared.saturating_sub(report.pool);
+    format!(
+        "{}total {} (pool {}, of which sharing saves {}; histories {}, kept {}, host {}), besides externals of {}\n",
+        table.render(),
+        bytes(report.total()),
+        bytes(report.pool),
+        bytes(shared),
+        bytes(report.history),
+        bytes(report.kept),
+        bytes(report.host),
+        bytes(report.external),
+    )
+}
+
+fn report(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> serde_json::Value {
+    let (width, height) = renderer.settings().size;
+    let stages: Vec<_> = by_stage(samples)
+        .into_iter()
+        .map(|(stage, nodes)| {
+            json!({
+                "stage": stage,
+                "nodes": nodes.len(),
+                "gpu_ms": {"median": sum(&nodes, |n| n.gpu.median()), "p95": sum(&nodes, |n| n.gpu.percentile(95.0))},
+                "cpu_ms": {"median": sum(&nodes, |n| n.cpu.median()), "p95": sum(&nodes, |n| n.cpu.percentile(95.0))},
+            })
+        })
+        .collect();
+    let mut report = stats::timings(samples);
+    report["stages"] = json!(stages);
+    json!({
+        "manylight": env!("CARGO_PKG_VERSION"),
+        "pipeline": renderer.pipeline().name,
+        "scene": renderer.scene().name,
+        "size": [width, height],
+        "frames": args.frames,
+        "warm_up": args.warm_up,
+        "adapter": stats::adapter(renderer.gpu()),
+        "parameters": stats::parameters(renderer.plan()),
+        "timings": report,
+        "memory": stats::memory(renderer),
+    })
+}

@@ -1,0 +1,92 @@
+//! `manylight render`: frames of a scene, the last one written.
+
+use std::time::Instant;
+
+use manylight::{
+    fault::Fault,
+    files::{FileKind, write_text},
+    renderer::Renderer,
+};
+use serde_json::{Value, json};
+
+use super::{
+    of_file,
+    outputs::Outputs,
+    session::{Session, of_render, settings, time_of},
+    stats::{self, FrameSamples},
+};
+use crate::{
+    cli::{Cli, RenderArgs},
+    progress,
+};
+
+/// Checks everything that can be known, then renders and writes.
+pub fn run(cli: &Cli, args: &RenderArgs) -> Result<(), Fault> {
+    let outputs = Outputs { pictures: args.out.clone(), dumps: args.dump.clone() };
+    check(args, &outputs)?;
+    let session = Session::open(cli, &args.pipeline.pipeline)?;
+    let scene = session.scene(&args.frame.scene)?;
+    let settings = settings(&args.pipeline, &args.frame, outputs.keep(session.documents.registry()));
+    outputs.check_plan(&session.plan(Some(&scene), &settings)?)?;
+    let gpu = super::open_gpu(args.frame.adapter.as_ref())?;
+    let spinner = progress::spinner("compiling shaders");
+    let mut renderer = session.renderer(&gpu, scene, settings)?;
+    spinner.finish_and_clear();
+    let samples = frames(&mut renderer, args)?;
+    outputs.write(&renderer)?;
+    if let Some(file) = &args.stats {
+        let stats = stats(&renderer, args, &samples)?;
+        write_text(file, &format!("{stats:#}\n")).map_err(of_file)?;
+    }
+    Ok(())
+}
+
+fn check(args: &RenderArgs, outputs: &Outputs) -> Result<(), Fault> {
+    if args.out.is_empty() && args.dump.is_empty() && args.stats.is_none() {
+        return Err(Fault::Usage("there is nothing to write: give --out FILE, --dump RESOURCE=FILE or --stats FILE.json".to_owned()));
+    }
+    outputs.check_files(args.stats.as_deref())?;
+    match &args.stats {
+        Some(file) if !matches!(FileKind::of(file), Ok(FileKind::Json)) => {
+            Err(Fault::Usage(format!("`{}`: --stats writes a .json file", file.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn frames(renderer: &mut Renderer, args: &RenderArgs) -> Result<FrameSamples, Fault> {
+    let mut samples = FrameSamples::new(renderer.plan());
+    let bar = progress::bar(args.frames.into(), "rendering");
+    for frame in 0..u64::from(args.frames) {
+        let start = Instant::now();
+        renderer.render_frame(time_of(&args.frame, frame)).map_err(of_render)?;
+        let timings = renderer.wait_timings();
+        samples.push(timings, start.elapsed().as_secs_f64() * 1e3);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(samples)
+}
+
+fn stats(renderer: &Renderer, args: &RenderArgs, samples: &FrameSamples) -> Result<Value, Fault> {
+    let (plan, scene) = (renderer.plan(), renderer.scene());
+    let mut names: Vec<String> = args.dump.iter().map(|(name, _)| name.clone()).collect();
+    names.extend(plan.radiance.map(|index| plan.resources[index].name.clone()));
+    names.dedup();
+    let (width, height) = renderer.settings().size;
+    Ok(json!({
+        "manylight": env!("CARGO_PKG_VERSION"),
+        "pipeline": renderer.pipeline().name,
+        "scene": {"name": scene.name, "triangles": scene.triangle_count(), "lights": scene.lights.len(), "features": scene.features()},
+        "size": [width, height],
+        "frames": args.frames,
+        "time": time_of(&args.frame, u64::from(args.frames) - 1),
+        "seed": args.frame.seed,
+        "adapter": stats::adapter(renderer.gpu()),
+        "parameters": stats::parameters(plan),
+        "timings": stats::timings(samples),
+        "memory": stats::memory(renderer),
+        "plan": stats::plan(plan),
+        "sums": stats::sums(renderer, &names)?,
+    }))
+}

@@ -1,0 +1,104 @@
+//! The library, a pipeline and a scene as the command line names them; plans without a GPU.
+
+use std::path::Path;
+
+use manylight::{
+    Documents, SceneSource, Settings,
+    fault::Fault,
+    gpu::Gpu,
+    graph::{
+        diagnostics::{Diagnostic, Diagnostics, Severity},
+        pipeline::Pipeline,
+        plan::{Debug, Plan, PlanInput},
+    },
+    library, plan_input,
+    renderer::{RenderError, Renderer},
+    scene::Scene,
+};
+
+use crate::cli::{Cli, DebugArgs, FrameArgs, PipelineArgs};
+
+/// Documents of a pipeline, loaded.
+pub struct Session {
+    pub documents: Documents,
+}
+
+/// A scene and where it came from.
+pub struct LoadedScene {
+    pub source: SceneSource,
+    pub scene: Scene,
+}
+
+impl Session {
+    /// Opens the library and loads the pipeline.
+    pub fn open(cli: &Cli, pipeline: &str) -> Result<Self, Fault> {
+        let library = library::open(cli.root.as_deref())?;
+        Ok(Self { documents: Documents::load(library, Path::new(pipeline))? })
+    }
+
+    pub fn pipeline(&self) -> &Pipeline {
+        self.documents.pipeline()
+    }
+
+    /// Finds and loads a scene; what was mended is printed as warnings.
+    pub fn scene(&self, name: &str) -> Result<LoadedScene, Fault> {
+        let source = library::scene(self.documents.library(), name)?;
+        let scene = source.load()?;
+        super::warn(&scene.warnings);
+        Ok(LoadedScene { source, scene })
+    }
+
+    /// What will run. Without a scene, one that has no features is assumed.
+    pub fn plan(&self, scene: Option<&LoadedScene>, settings: &Settings) -> Result<Plan, Fault> {
+        let input = match scene {
+            Some(loaded) => plan_input(settings, &loaded.scene),
+            None => PlanInput {
+                output: settings.size,
+                set: settings.set.clone(),
+                features: manylight::graph::features::KNOWN.iter().map(|name| ((*name).to_owned(), false)).collect(),
+                keep: settings.keep.clone(),
+                debug: settings.debug,
+                ..PlanInput::default()
+            },
+        };
+        Ok(self.documents.plan(&input)?)
+    }
+
+    /// Binds everything to a device.
+    pub fn renderer(self, gpu: &Gpu, scene: LoadedScene, settings: Settings) -> Result<Renderer, Fault> {
+        let renderer = Renderer::with(gpu, self.documents, scene.source, scene.scene, settings).map_err(of_render)?;
+        warn_of_lights(renderer.scene(), renderer.plan());
+        Ok(renderer)
+    }
+}
+
+/// Settings as the command line gives them.
+pub fn settings(pipeline: &PipelineArgs, frame: &FrameArgs, keep: Vec<String>) -> Settings {
+    Settings { size: frame.size.size, set: pipeline.set.clone(), keep, debug: debug(&frame.debug), seed: frame.seed }
+}
+
+fn debug(args: &DebugArgs) -> Debug {
+    Debug { no_culling: args.no_culling, no_reuse: args.no_reuse, poison: args.poison, shuffle: args.shuffle }
+}
+
+/// Scene time of a frame.
+pub fn time_of(args: &FrameArgs, frame: u64) -> f64 {
+    args.time + args.fps.map_or(0.0, |fps| frame as f64 / fps)
+}
+
+/// A render error as a fault of the input.
+pub fn of_render(error: RenderError) -> Fault {
+    match error {
+        RenderError::Documents(diagnostics) => Fault::Documents(diagnostics),
+        RenderError::Run(error) => Fault::Input(error.to_string()),
+    }
+}
+
+/// Pipelines read the first spot light only: says how many are not rendered.
+fn warn_of_lights(scene: &Scene, plan: &Plan) {
+    let dark = scene.lights.len().saturating_sub(1);
+    if dark > 0 && plan.resource("scene_light").is_some() {
+        let message = format!("the scene has {} lights; this pipeline renders the first: {dark} are not rendered", scene.lights.len());
+        super::warn(&Diagnostics(vec![Diagnostic { severity: Severity::Warning, ..Diagnostic::error_nowhere(message) }]));
+    }
+}

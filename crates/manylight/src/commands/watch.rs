@@ -1,0 +1,137 @@
+//! `manylight watch`: renders again whenever a file changes.
+
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant, SystemTime},
+};
+
+use manylight::{
+    fault::Fault,
+    gpu::Watcher,
+    renderer::{ReloadReport, Renderer},
+};
+
+use super::{
+    note,
+    outputs::Outputs,
+    session::{Session, of_render, settings, time_of},
+};
+use crate::cli::{Cli, WatchArgs};
+
+/// How long to wait for a change before looking again.
+const PATIENCE: Duration = Duration::from_secs(3600);
+
+/// Renders once, then after every change until interrupted.
+pub fn run(cli: &Cli, args: &WatchArgs) -> Result<(), Fault> {
+    let outputs = Outputs { pictures: args.out.clone(), dumps: Vec::new() };
+    outputs.check_files(None)?;
+    let session = Session::open(cli, &args.pipeline.pipeline)?;
+    let scene = session.scene(&args.frame.scene)?;
+    let settings = settings(&args.pipeline, &args.frame, Vec::new());
+    outputs.check_plan(&session.plan(Some(&scene), &settings)?)?;
+    let gpu = super::open_gpu(args.frame.adapter.as_ref())?;
+    let renderer = session.renderer(&gpu, scene, settings)?;
+    let mut watcher = Watcher::new(renderer.watch_set()).map_err(|e| Fault::Input(e.to_string()))?;
+    let mut watch = Watch { args, outputs, renderer, frame: 0, pictures: 0 };
+    let start = Instant::now();
+    watch.picture(args.frames)?;
+    let files = watcher_files(&watch.renderer);
+    note(&format!("first picture after {:.0} ms; watching {files}; Ctrl+C ends", start.elapsed().as_secs_f64() * 1e3));
+    while !watch.is_done() {
+        let changed = watcher.recv_timeout(PATIENCE);
+        if changed.is_empty() {
+            continue;
+        }
+        watch.follow(&changed)?;
+        watcher.set(watch.renderer.watch_set()).map_err(|e| Fault::Input(e.to_string()))?;
+    }
+    Ok(())
+}
+
+struct Watch<'a> {
+    args: &'a WatchArgs,
+    outputs: Outputs,
+    renderer: Renderer,
+    /// Frames rendered so far.
+    frame: u64,
+    /// Changes that led to a picture.
+    pictures: u32,
+}
+
+impl Watch<'_> {
+    fn is_done(&self) -> bool {
+        self.args.pictures.is_some_and(|most| self.pictures >= most)
+    }
+
+    fn picture(&mut self, frames: u32) -> Result<(), Fault> {
+        for _ in 0..frames {
+            self.renderer.render_frame(time_of(&self.args.frame, self.frame)).map_err(of_render)?;
+            self.frame += 1;
+        }
+        self.outputs.write(&self.renderer)?;
+        Ok(())
+    }
+
+    /// Takes over a change: the picture is written after one frame, and again when the iterative parts have settled.
+    fn follow(&mut self, changed: &[PathBuf]) -> Result<(), Fault> {
+        let saved = saved_at(changed);
+        let names: Vec<String> = changed.iter().map(|path| shown(path)).collect();
+        note(&format!("changed: {}", names.join(", ")));
+        let report = match self.renderer.reload(changed) {
+            Ok(report) => report,
+            Err(faults) => {
+                note(&format!("{}\nthe last good frame is kept", faults.render().trim_end()));
+                return Ok(());
+            }
+        };
+        if let Err(fault) = self.outputs.check_plan(self.renderer.plan()).and_then(|()| self.picture(1)) {
+            // A host node or the disk: the next change may mend it.
+            note(&fault.render());
+            return Ok(());
+        }
+        let took = saved.elapsed().unwrap_or(report.took);
+        note(&describe(&report, took));
+        if self.args.frames > 1 {
+            self.picture(self.args.frames - 1)?;
+        }
+        self.pictures += 1;
+        Ok(())
+    }
+}
+
+fn describe(report: &ReloadReport, took: Duration) -> String {
+    let build = &report.build;
+    let mut parts = vec![format!("{} nodes kept", build.kept.len())];
+    let list = |what: &str, names: &[String]| format!("{what} {}", names.join(", "));
+    if build.rebuilt.is_empty() {
+        parts.push("none rebuilt".to_owned());
+    } else {
+        parts.push(list("rebuilt", &build.rebuilt));
+    }
+    if !build.reset.is_empty() {
+        parts.push(list("reset", &build.reset));
+    }
+    if report.scene_changed {
+        parts.push("scene loaded again".to_owned());
+    }
+    let warnings = if report.warnings.is_empty() { String::new() } else { format!("{}\n", report.warnings.render().trim_end()) };
+    format!("{warnings}{}; {:.0} ms from save to picture", parts.join("; "), took.as_secs_f64() * 1e3)
+}
+
+/// When the newest of the files was saved; now, for files that are gone.
+fn saved_at(changed: &[PathBuf]) -> SystemTime {
+    let modified = |path: &PathBuf| path.metadata().and_then(|m| m.modified()).ok();
+    changed.iter().filter_map(modified).max().unwrap_or_else(SystemTime::now)
+}
+
+fn shown(path: &std::path::Path) -> String {
+    let here = std::env::current_dir().ok().and_then(|here| path.strip_prefix(here).ok().map(std::path::Path::to_owned));
+    here.as_deref().unwrap_or(path).display().to_string()
+}
+
+fn watcher_files(renderer: &Renderer) -> String {
+    let set = renderer.watch_set();
+    let mut names: Vec<String> = set.folders.iter().map(|f| shown(f)).collect();
+    names.push(format!("{} files", set.files.len()));
+    names.join(", ")
+}

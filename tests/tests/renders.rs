@@ -1,0 +1,128 @@
+//! Rendering through the library, for tests that look at pixels and buffers.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::OnceLock,
+};
+
+use manylight_gpu::{Gpu, GpuOptions, Image};
+use manylight_graph::{library::Library, plan::Debug};
+use manylight_passes::{Renderer, SceneSource, Settings};
+
+use crate::support::root;
+
+/// One device for all tests of the binary. No adapter is a failure that says what to install.
+pub fn gpu() -> &'static Gpu {
+    static GPU: OnceLock<Gpu> = OnceLock::new();
+    GPU.get_or_init(|| Gpu::new(&GpuOptions::default()).unwrap_or_else(|e| panic!("{e}")))
+}
+
+/// What to render; the pipeline is `acrsm` unless said otherwise.
+pub struct Job {
+    pub pipeline: String,
+    pub scene: PathBuf,
+    pub size: (u32, u32),
+    pub frames: u32,
+    pub set: Vec<(String, String)>,
+    pub keep: Vec<String>,
+    pub debug: Debug,
+}
+
+impl Job {
+    /// A scene of `assets/` by its name.
+    pub fn asset(name: &str) -> Self {
+        Self::scene(&root().join("assets").join(name).with_extension("ron"))
+    }
+
+    /// A scene by its path. 256² pixels, 24 frames: the clusters have settled then.
+    pub fn scene(path: &Path) -> Self {
+        Self {
+            pipeline: root().join("pipelines/acrsm.ron").to_string_lossy().into_owned(),
+            scene: path.to_owned(),
+            size: (256, 256),
+            frames: 24,
+            set: Vec::new(),
+            keep: Vec::new(),
+            debug: Debug::default(),
+        }
+    }
+
+    /// A small picture with a small RSM and few points, for claims that do not need quality.
+    pub fn small(self) -> Self {
+        Self { size: (64, 64), frames: 6, ..self }.set("rsm_size", 128).set("point_count", 8000)
+    }
+
+    pub fn set(mut self, name: &str, value: impl ToString) -> Self {
+        self.set.push((name.to_owned(), value.to_string()));
+        self
+    }
+
+    pub fn keep(mut self, resources: &[&str]) -> Self {
+        self.keep.extend(resources.iter().map(ToString::to_string));
+        self
+    }
+
+    pub fn frames(self, frames: u32) -> Self {
+        Self { frames, ..self }
+    }
+
+    /// A renderer that has rendered nothing yet.
+    #[track_caller]
+    pub fn renderer(&self) -> Renderer {
+        let settings = Settings { size: self.size, set: self.set.clone(), keep: self.keep.clone(), debug: self.debug, seed: 0 };
+        let library = Library::new(Some(root()), Vec::new());
+        Renderer::new(gpu(), library, &self.pipeline, SceneSource::file(&self.scene), settings).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    /// A renderer after `frames` frames at time 0.
+    #[track_caller]
+    pub fn render(&self) -> Renderer {
+        let mut renderer = self.renderer();
+        for _ in 0..self.frames {
+            renderer.render_frame(0.0).unwrap_or_else(|e| panic!("{e}"));
+        }
+        renderer
+    }
+}
+
+/// Reads a texture.
+#[track_caller]
+pub fn read(renderer: &Renderer, resource: &str) -> Image {
+    renderer.read(resource).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A cluster as the graph's buffer holds it.
+#[derive(Debug, Clone)]
+pub struct Cluster {
+    pub position: [f64; 3],
+    pub normal: [f64; 3],
+    pub flux: [f64; 3],
+    pub area: f64,
+    pub importance: f64,
+    pub texel: [f64; 2],
+    pub count: u64,
+    pub state: u64,
+}
+
+/// Reads a buffer of clusters.
+#[track_caller]
+pub fn read_clusters(renderer: &Renderer, resource: &str) -> Vec<Cluster> {
+    let json = renderer.read_json(resource).unwrap_or_else(|e| panic!("{e}"));
+    fn numbers<const N: usize>(value: &serde_json::Value) -> [f64; N] {
+        std::array::from_fn(|i| value[i].as_f64().expect("a finite number"))
+    }
+    json.as_array()
+        .expect("an array of clusters")
+        .iter()
+        .map(|c| Cluster {
+            position: numbers(&c["position"]),
+            normal: numbers(&c["normal"]),
+            flux: numbers(&c["flux"]),
+            area: c["area"].as_f64().expect("area"),
+            importance: c["importance"].as_f64().expect("importance"),
+            texel: numbers(&c["texel"]),
+            count: c["count"].as_u64().expect("count"),
+            state: c["state"].as_u64().expect("state"),
+        })
+        .collect()
+}
