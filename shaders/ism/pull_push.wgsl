@@ -13,15 +13,16 @@ struct Params {
 @group(0) @binding(1) var ism: texture_storage_2d<r32float, write>;
 @group(0) @binding(2) var<uniform> params: Params;
 
-const BLOCK: u32 = 16u;
+// Each invocation has a square of 2×2 texels, a group 16×16.
+const SIDE: u32 = 8u;
 const NOTHING: f32 = 1.0;
 
-// Levels one after the other: 16², 8², 4², 2², 1 texels.
-var<workgroup> levels: array<f32, 341>;
+// Levels 1 to 4, one after the other: 8², 4², 2², 1 texels.
+var<workgroup> levels: array<f32, 85>;
 
+// Where a level starts: sum of 64 / 4^(i - 1) for 1 ≤ i < level.
 fn level_start(level: u32) -> u32 {
-    // Sum of 256 / 4^i for i < level.
-    return (1024u - (1024u >> (2u * level))) / 3u;
+    return (256u - (1024u >> (2u * level))) / 3u;
 }
 
 fn median_of_four(v: vec4f) -> f32 {
@@ -53,35 +54,42 @@ fn median_of_four(v: vec4f) -> f32 {
     return select(second, least, count == 2u);
 }
 
-@compute @workgroup_size(16, 16)
+@compute @workgroup_size(8, 8)
 fn pull_push(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_id) local: vec3u, @builtin(local_invocation_index) lane: u32) {
     let size = textureDimensions(ism);
-    let inside = all(id.xy < size);
-    var value = NOTHING;
+    let corner = 2u * id.xy;
+    // Sides of the atlas are even: all four texels are inside, or none is.
+    let inside = all(corner < size);
+    var values = vec4f(NOTHING);
     if inside {
-        value = bitcast<f32>(ism_splats[id.y * size.x + id.x]);
+        let at = corner.y * size.x + corner.x;
+        values = bitcast<vec4f>(vec4u(ism_splats[at], ism_splats[at + 1u], ism_splats[at + size.x], ism_splats[at + size.x + 1u]));
     }
-    levels[lane] = value;
-    workgroupBarrier();
-
-    for (var level = 1u; level <= params.pull_push; level++) {
-        let side = BLOCK >> level;
-        if lane < side * side {
-            let p = 2u * vec2u(lane % side, lane / side);
-            let row = 2u * side;
-            let at = level_start(level - 1u) + p.y * row + p.x;
-            levels[level_start(level) + lane] = median_of_four(vec4f(levels[at], levels[at + 1u], levels[at + row], levels[at + row + 1u]));
+    if params.pull_push > 0u {
+        levels[lane] = median_of_four(values);
+        for (var level = 2u; level <= params.pull_push; level++) {
+            workgroupBarrier();
+            let side = SIDE >> (level - 1u);
+            if lane < side * side {
+                let p = 2u * vec2u(lane % side, lane / side);
+                let row = 2u * side;
+                let at = level_start(level - 1u) + p.y * row + p.x;
+                levels[level_start(level) + lane] = median_of_four(vec4f(levels[at], levels[at + 1u], levels[at + row], levels[at + row + 1u]));
+            }
         }
         workgroupBarrier();
-    }
-    // A hole takes the finest level that has a value: what pushing level by level leads to.
-    if value >= NOTHING {
-        for (var level = 1u; level <= params.pull_push && value >= NOTHING; level++) {
-            let p = local.xy >> vec2u(level);
-            value = levels[level_start(level) + p.y * (BLOCK >> level) + p.x];
+        // A hole takes the finest level that has a value: what pushing level by level leads to.
+        var fill = NOTHING;
+        for (var level = 1u; level <= params.pull_push && fill >= NOTHING; level++) {
+            let p = local.xy >> vec2u(level - 1u);
+            fill = levels[level_start(level) + p.y * (SIDE >> (level - 1u)) + p.x];
         }
+        values = select(values, vec4f(fill), values >= vec4f(NOTHING));
     }
     if inside {
-        textureStore(ism, id.xy, vec4f(value, 0.0, 0.0, 0.0));
+        textureStore(ism, corner, vec4f(values.x, 0.0, 0.0, 0.0));
+        textureStore(ism, corner + vec2u(1u, 0u), vec4f(values.y, 0.0, 0.0, 0.0));
+        textureStore(ism, corner + vec2u(0u, 1u), vec4f(values.z, 0.0, 0.0, 0.0));
+        textureStore(ism, corner + vec2u(1u, 1u), vec4f(values.w, 0.0, 0.0, 0.0));
     }
 }

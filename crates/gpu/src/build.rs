@@ -108,6 +108,7 @@ impl Frame {
             host_bytes: host_bytes(plan, &host_outputs),
             poison: None,
             timer: Timer::new(gpu, std::iter::empty(), false),
+            serial: previous.is_some_and(|f| f.serial),
             index: previous.map_or(0, |f| f.index),
         };
         for (node, prepared) in plan.nodes.iter().zip(prepared) {

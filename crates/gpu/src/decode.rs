@@ -35,10 +35,13 @@ pub(crate) fn decode_texel(format: Format, encoding: Encoding, texel: &[u8], to:
     }
 }
 
-/// The unit vector of an octahedral code (x in the low half), or zero for the code 0, which stands for "none".
+/// The unit vector of an octahedral code (x in the low half), or zero for the code 0, which stands for "none": the twin of
+/// `shaders/common/octahedral.wgsl`, where the spare code −32768 of the first component stands in for 0 so that +z has a code.
 pub fn octahedral(code: u32) -> [f32; 3] {
-    if code == 0 {
-        return [0.0; 3];
+    match code {
+        0 => return [0.0; 3],
+        0x8000 => return [0.0, 0.0, 1.0],
+        _ => {}
     }
     let snorm = |bits: u32| (f32::from(bits as u16 as i16) / 32767.0).max(-1.0);
     let (x, y) = (snorm(code & 0xffff), snorm(code >> 16));
@@ -145,6 +148,7 @@ mod tests {
         assert_eq!(octahedral(0), [0.0; 3]);
         assert_eq!(octahedral(0x0000_7fff), [1.0, 0.0, 0.0]);
         assert_eq!(octahedral(0x7fff_0000), [0.0, 1.0, 0.0]);
+        assert_eq!(octahedral(0x0000_8000), [0.0, 0.0, 1.0]);
         // All of −z lies at the corners.
         let [x, y, z] = octahedral(0x7fff_7fff);
         assert!(x.abs() < 1e-4 && y.abs() < 1e-4 && (z + 1.0).abs() < 1e-6);

@@ -21,6 +21,8 @@ use crate::{
     timing::{FrameTimings, Timer},
 };
 
+const FRAME_ENCODER: wgpu::CommandEncoderDescriptor<'static> = wgpu::CommandEncoderDescriptor { label: Some("frame") };
+
 /// A plan bound to a device: pipelines, bind groups, memory and timers.
 pub struct Frame {
     pub(crate) plan: Plan,
@@ -30,6 +32,8 @@ pub struct Frame {
     pub(crate) host_bytes: BTreeMap<ResourceIx, HostBytes>,
     pub(crate) poison: Option<Poison>,
     pub(crate) timer: Timer,
+    /// Submit and wait node by node.
+    pub(crate) serial: bool,
     /// Frames run so far; its lowest bit chooses the copy of each history.
     pub(crate) index: u64,
 }
@@ -143,19 +147,53 @@ impl Frame {
         let start = Instant::now();
         self.follow_externals(gpu, externals)?;
         self.run_hosts(gpu, externals, data)?;
-        self.timer.begin();
-        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("frame") };
-        let mut encoder = gpu.device().create_command_encoder(&descriptor);
-        self.encode(&mut encoder, self.parity());
-        self.timer.resolve(&mut encoder);
-        gpu.queue().submit([encoder.finish()]);
-        let cpu_ns = nanoseconds(start);
-        self.timer.submitted(self.index, cpu_ns);
+        if self.serial {
+            self.submit_serially(gpu);
+        } else {
+            self.timer.begin();
+            let mut encoder = gpu.device().create_command_encoder(&FRAME_ENCODER);
+            self.encode(&mut encoder, self.parity());
+            self.timer.resolve(&mut encoder);
+            gpu.queue().submit([encoder.finish()]);
+            self.timer.submitted(self.index, nanoseconds(start));
+        }
         self.index += 1;
         if gpu.error_count() != errors_before {
             return Err(RunError::Gpu(gpu.take_errors().join("; ")));
         }
         Ok(())
+    }
+
+    /// Whether each node is submitted on its own and waited for, so that its GPU time is the wall-clock time of that.
+    ///
+    /// For measuring on adapters whose timestamps are not tied to the work around them: software Vulkan rasterizes
+    /// and answers timestamps in threads of its own, so that the time of a node shows up at another. Slower than a
+    /// usual frame by a submission and a wait a node; the picture is the same.
+    pub fn measure_serially(&mut self, on: bool) {
+        self.serial = on;
+    }
+
+    fn submit_serially(&mut self, gpu: &Gpu) {
+        let parity = self.parity();
+        let (mut cpu_ns, mut gpu_ns) = (0, 0);
+        gpu.wait();
+        for ix in 0..self.nodes.len() {
+            if self.nodes[ix].passes.is_empty() {
+                continue;
+            }
+            let start = Instant::now();
+            let mut encoder = gpu.device().create_command_encoder(&FRAME_ENCODER);
+            self.encode_node(&mut encoder, ix, parity);
+            let commands = encoder.finish();
+            cpu_ns += nanoseconds(start);
+            let start = Instant::now();
+            gpu.queue().submit([commands]);
+            gpu.wait();
+            let took = nanoseconds(start);
+            gpu_ns += took;
+            self.timer.set_serial(ix, took);
+        }
+        self.timer.ran_serially(self.index, cpu_ns, gpu_ns);
     }
 
     pub(crate) fn parity(&self) -> usize {
@@ -168,31 +206,36 @@ impl Frame {
 
     /// Records all nodes.
     pub(crate) fn encode(&mut self, encoder: &mut wgpu::CommandEncoder, parity: usize) {
-        let Self { plan, nodes, timer, poison, .. } = self;
-        for (ix, (node, planned)) in nodes.iter().zip(&plan.nodes).enumerate() {
-            if node.passes.is_empty() {
-                continue;
-            }
-            let start = Instant::now();
-            let id = planned.id.as_str();
-            let _span = tracing::info_span!("node", node = id, stage = planned.stage.as_str()).entered();
-            if let Some(poison) = poison {
-                for fill in &node.poisons {
-                    poison.fill(encoder, fill);
-                }
-            }
-            let span = timer.span(ix);
-            let last = node.passes.len() - 1;
-            for (i, pass) in node.passes.iter().enumerate() {
-                let stamps = span.filter(|_| i == 0 || i == last);
-                let stamps = stamps.map(|(set, begin, end)| (set, (i == 0).then_some(begin), (i == last).then_some(end)));
-                match pass {
-                    Pass::Compute(steps) => compute(encoder, id, steps, parity, stamps),
-                    Pass::Draw(step) => draw(encoder, id, step, parity, stamps),
-                }
-            }
-            timer.set_cpu(ix, nanoseconds(start));
+        for ix in 0..self.nodes.len() {
+            self.encode_node(encoder, ix, parity);
         }
+    }
+
+    fn encode_node(&mut self, encoder: &mut wgpu::CommandEncoder, ix: usize, parity: usize) {
+        let Self { plan, nodes, timer, poison, .. } = self;
+        let (node, planned) = (&nodes[ix], &plan.nodes[ix]);
+        if node.passes.is_empty() {
+            return;
+        }
+        let start = Instant::now();
+        let id = planned.id.as_str();
+        let _span = tracing::info_span!("node", node = id, stage = planned.stage.as_str()).entered();
+        if let Some(poison) = poison {
+            for fill in &node.poisons {
+                poison.fill(encoder, fill);
+            }
+        }
+        let span = timer.span(ix);
+        let last = node.passes.len() - 1;
+        for (i, pass) in node.passes.iter().enumerate() {
+            let stamps = span.filter(|_| i == 0 || i == last);
+            let stamps = stamps.map(|(set, begin, end)| (set, (i == 0).then_some(begin), (i == last).then_some(end)));
+            match pass {
+                Pass::Compute(steps) => compute(encoder, id, steps, parity, stamps),
+                Pass::Draw(step) => draw(encoder, id, step, parity, stamps),
+            }
+        }
+        timer.set_cpu(ix, nanoseconds(start));
     }
 
     /// Binds externals whose memory was replaced since the bind groups were made.

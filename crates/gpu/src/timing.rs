@@ -108,6 +108,22 @@ impl Timer {
         }
     }
 
+    /// Time of a node that was submitted and waited for on its own.
+    pub(crate) fn set_serial(&mut self, node: usize, gpu_ns: u64) {
+        if let Some(node) = self.latest.nodes.get_mut(node) {
+            node.gpu_ns = Some(gpu_ns);
+        }
+    }
+
+    /// After a frame whose nodes were waited for one after the other.
+    pub(crate) fn ran_serially(&mut self, frame: u64, cpu_ns: u64, gpu_ns: u64) {
+        (self.latest.frame, self.latest.cpu_ns, self.latest.gpu_ns) = (frame, cpu_ns, Some(gpu_ns));
+        for (node, ns) in self.latest.nodes.iter_mut().zip(&self.node_cpu_ns) {
+            node.cpu_ns = *ns;
+        }
+        self.has_sample = true;
+    }
+
     /// Collects what has arrived and chooses a slot for the frame to be recorded.
     pub(crate) fn begin(&mut self) {
         self.collect();

@@ -32,7 +32,9 @@ pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
     let mut attempt = |values: &Values<'_>, features: &BTreeMap<String, bool>, when: &str| {
         for fault in faults(&linked, values, features) {
             // One cause shows in many variants: it is told once, with the first variant that has it.
-            let same = |other: &Diagnostic| other.labels.first().map(|l| &l.span) == fault.labels.first().map(|l| &l.span) && kind(other) == kind(&fault);
+            let same = |other: &Diagnostic| {
+                other.labels.first().map(|l| &l.span) == fault.labels.first().map(|l| &l.span) && kind(other) == kind(&fault)
+            };
             if known.iter().any(same) {
                 continue;
             }

@@ -9,14 +9,17 @@ use std::{
 };
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use naga_oil::compose::{ComposableModuleDescriptor, Composer, ComposerError, ComposerErrorInner, ErrSource, NagaModuleDescriptor};
+use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor};
 
 use crate::{
     diagnostics::{Diagnostic, Source, Span},
-    reflect::demangle,
     render::{and_also, suggest},
     wgsl::{self, Scan},
 };
+
+mod explain;
+
+use explain::chain;
 
 /// naga_oil keeps the module number above this bit of a span.
 const SPAN_SHIFT: usize = 21;
@@ -122,6 +125,10 @@ impl Composition {
     fn direct_imports(&self, source: &Arc<Source>, scan: &Scan, out: &mut Vec<Diagnostic>) -> BTreeSet<String> {
         let mut found = BTreeSet::new();
         let mut named: BTreeSet<&str> = BTreeSet::new();
+        if let Some((range, what)) = wgsl::too_deep(&source.text) {
+            let fault = Diagnostic::error(format!("{what} are nested too deeply"), Span::new(source, range));
+            out.push(fault.help("name parts of it with `let`, or move them to functions"));
+        }
         if let Some(range) = &scan.unclosed {
             out.push(Diagnostic::error("the import's `{` is never closed", Span::new(source, range.clone())).help("add the missing `}`"));
         }
@@ -165,8 +172,11 @@ impl Composition {
     fn sort(&mut self, direct: &BTreeMap<String, BTreeSet<String>>, out: &mut Vec<Diagnostic>) {
         let mut done: BTreeSet<&String> = BTreeSet::new();
         loop {
-            let ready: Vec<&String> =
-                direct.iter().filter(|(name, needs)| !done.contains(name) && needs.iter().all(|n| done.contains(n))).map(|(n, _)| n).collect();
+            let ready: Vec<&String> = direct
+                .iter()
+                .filter(|(name, needs)| !done.contains(name) && needs.iter().all(|n| done.contains(n)))
+                .map(|(n, _)| n)
+                .collect();
             if ready.is_empty() {
                 break;
             }
@@ -189,11 +199,13 @@ impl Composition {
         let shown: Vec<&str> = cycle.iter().map(|n| n.as_str()).chain(cycle.first().map(|n| n.as_str())).collect();
         let place = |from: &str, to: &str| {
             let module = &self.modules[from];
-            let range = module.scan.paths.iter().find(|p| p.text == to || p.text.starts_with(&format!("{to}::"))).map_or(0..0, |p| p.range.clone());
+            let range =
+                module.scan.paths.iter().find(|p| p.text == to || p.text.starts_with(&format!("{to}::"))).map_or(0..0, |p| p.range.clone());
             Span::new(&module.source, range)
         };
         if let [first, second, ..] = shown.as_slice() {
-            let mut fault = Diagnostic::error(format!("modules import each other in a circle: {}", shown.join(" → ")), place(first, second));
+            let mut fault =
+                Diagnostic::error(format!("modules import each other in a circle: {}", shown.join(" → ")), place(first, second));
             for pair in shown.windows(2).skip(1) {
                 fault = fault.and(place(pair[0], pair[1]), format!("`{}` imports `{}`", pair[0], pair[1]));
             }
@@ -241,7 +253,12 @@ impl Composition {
     }
 
     /// Composes a text; its imports must be without faults.
-    pub fn compose(&mut self, source: &Arc<Source>, path: &str, imports: &BTreeSet<String>) -> Result<(naga::Module, ModuleInfo), Vec<Diagnostic>> {
+    pub fn compose(
+        &mut self,
+        source: &Arc<Source>,
+        path: &str,
+        imports: &BTreeSet<String>,
+    ) -> Result<(naga::Module, ModuleInfo), Vec<Diagnostic>> {
         let mut composer = self.composer.take().unwrap_or_else(|| Composer::default().with_capabilities(Capabilities::all()));
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             for name in self.order.iter().filter(|name| imports.contains(*name)) {
@@ -277,146 +294,24 @@ impl Composition {
             }
         }
     }
-
-    /// Turns the composer's error into a diagnostic in the right file.
-    fn explain(&self, composer: &Composer, source: &Arc<Source>, path: &str, error: &ComposerError) -> Diagnostic {
-        let (file, module_index) = match &error.source {
-            ErrSource::Module { name, .. } => match self.modules.get(name) {
-                Some(module) => {
-                    let index = composer.module_index.iter().find(|(_, n)| *n == name).map_or(0, |(i, _)| *i);
-                    (&module.source, index)
-                }
-                None => (source, 0),
-            },
-            ErrSource::Constructing { path: at, .. } => match self.modules.values().find(|m| m.path == *at && m.path != path) {
-                Some(module) => (&module.source, 0),
-                None => (source, 0),
-            },
-        };
-        let replaced = error.source.source(composer);
-        let offset = error.source.offset();
-        let place = |range: Range<usize>| {
-            let local = |at: usize| (at & ((1 << SPAN_SHIFT) - 1)).saturating_sub(offset);
-            let start = wgsl::original_offset(&file.text, &replaced, local(range.start));
-            let end = wgsl::original_offset(&file.text, &replaced, local(range.end)).max(start);
-            Span::new(file, start..end)
-        };
-        let at = |position: usize| Span::new(file, { let p = wgsl::original_offset(&file.text, &replaced, position); p..p });
-        match &error.inner {
-            ComposerErrorInner::WgslParseError(e) => {
-                let labels = e.labels().filter_map(|(span, text)| Some((span.to_range()?, text.to_owned()))).collect();
-                self.labelled(self.undecorate(e.message()), labels, &place, file)
-            }
-            ComposerErrorInner::HeaderValidationError(e) | ComposerErrorInner::ShaderValidationError(e) => {
-                let labels = e
-                    .spans()
-                    .filter_map(|(span, text)| Some((span.to_range()?, text.clone())))
-                    .filter(|(range, _)| matches!(range.start >> SPAN_SHIFT, 0) || range.start >> SPAN_SHIFT == module_index)
-                    .collect();
-                self.labelled(self.undecorate(&chain(e.as_inner())), labels, &place, file)
-            }
-            ComposerErrorInner::ImportNotFound(name, position) => {
-                let help = suggest(name, self.modules.keys().map(String::as_str));
-                Diagnostic::error(format!("there is no module `{name}`"), at(*position)).help(help)
-            }
-            ComposerErrorInner::ImportParseError(message, position) => {
-                Diagnostic::error(format!("the import cannot be read: {message}"), at(*position)).help("write `#import common::file::{a, b}`")
-            }
-            ComposerErrorInner::InvalidIdentifier { original, at: span } => {
-                let range = span.to_range().map_or(0..0, |r| place(r).range);
-                Diagnostic::error(format!("the name `{original}` cannot be shared between files"), Span::new(file, range))
-                    .help("names of members and items in shaders/common must not end in a digit or be reserved words: rename it")
-            }
-            ComposerErrorInner::DecorationInSource(range) => Diagnostic::error("this name is reserved by the composer", Span::new(file, range.clone())),
-            ComposerErrorInner::NotEnoughEndIfs(p)
-            | ComposerErrorInner::TooManyEndIfs(p)
-            | ComposerErrorInner::ElseWithoutCondition(p)
-            | ComposerErrorInner::DefineInModule(p)
-            | ComposerErrorInner::UnknownShaderDef { pos: p, .. }
-            | ComposerErrorInner::UnknownShaderDefOperator { pos: p, .. }
-            | ComposerErrorInner::OverrideNotVirtual { pos: p, .. }
-            | ComposerErrorInner::InvalidShaderDefComparisonValue { pos: p, .. }
-            | ComposerErrorInner::InvalidShaderDefDefinitionValue { pos: p, .. } => {
-                Diagnostic::error(self.undecorate(&error.inner.to_string()), at(*p))
-            }
-            ComposerErrorInner::InvalidWgslDirective { position: line, .. } => {
-                let start = file.text.lines().take(*line).map(|l| l.len() + 1).sum();
-                Diagnostic::error(error.inner.to_string(), Span::new(file, start..start))
-            }
-            other => Diagnostic::error(self.undecorate(&other.to_string()), Span::new(file, 0..0)),
-        }
-    }
-
-    fn labelled(&self, message: String, labels: Vec<(Range<usize>, String)>, place: &dyn Fn(Range<usize>) -> Span, file: &Arc<Source>) -> Diagnostic {
-        let mut labels = labels.into_iter();
-        match labels.next() {
-            None => Diagnostic::error(message, Span::new(file, 0..0)),
-            Some((range, text)) => {
-                let first = Diagnostic::error(message, place(range)).at(self.label(&text));
-                labels.fold(first, |fault, (range, text)| fault.and(place(range), self.label(&text)))
-            }
-        }
-    }
-
-    /// A label in the user's words: indices into naga's tables say nothing.
-    fn label(&self, text: &str) -> String {
-        if text.starts_with("naga::") { String::new() } else { self.undecorate(text) }
-    }
-
-    /// Takes naga_oil's marks out of a message.
-    fn undecorate(&self, text: &str) -> String {
-        let mut text = text.to_owned();
-        for name in self.modules.keys() {
-            let mark = Composer::decorated_name(Some(name), "");
-            if text.contains(&mark) {
-                text = text.replace(&mark, "");
-            }
-        }
-        debug_assert!(demangle(&text).len() <= text.len());
-        text
-    }
 }
 
 fn module_needs(module: &Module) -> BTreeSet<String> {
     module.imports.clone()
 }
 
-/// An error and its causes, from the outside in. Those that only number an item that the labels show are left out.
-fn chain(error: &dyn std::error::Error) -> String {
-    let mut parts = Vec::new();
-    let mut at = Some(error);
-    while let Some(cause) = at {
-        parts.push(cause.to_string());
-        at = cause.source();
-    }
-    let last = parts.len().saturating_sub(1);
-    let numbered = |text: &str| text.ends_with(" is invalid") && ["Expression [", "Function [", "Entry point ", "Call to ["].iter().any(|s| text.starts_with(s));
-    let kept: Vec<String> = parts.into_iter().enumerate().filter(|(i, text)| *i == last || !numbered(text)).map(|(_, text)| text).collect();
-    wgsl_types(&kept.join(": "))
-}
-
-/// naga's spelling of types as WGSL has it.
-fn wgsl_types(text: &str) -> String {
-    let mut text = text.to_owned();
-    for (kind, width, scalar, letter) in [("Float", 4, "f32", "f"), ("Uint", 4, "u32", "u"), ("Sint", 4, "i32", "i"), ("Bool", 1, "bool", "<bool>")] {
-        let inner = format!("Scalar {{ kind: {kind}, width: {width} }}");
-        text = text.replace(&format!("Scalar({inner})"), scalar);
-        for (size, n) in [("Bi", 2), ("Tri", 3), ("Quad", 4)] {
-            text = text.replace(&format!("Vector {{ size: {size}, scalar: {inner} }}"), &format!("vec{n}{letter}"));
-        }
-    }
-    text
-}
-
 /// What a file of `shaders/common/` must not have.
 fn check_common(module: &Module, out: &mut Vec<Diagnostic>) {
-    let fault = |range: &Range<usize>, message: String, help: &str| Diagnostic::error(message, Span::new(&module.source, range.clone())).help(help);
+    let fault =
+        |range: &Range<usize>, message: String, help: &str| Diagnostic::error(message, Span::new(&module.source, range.clone())).help(help);
     for (name, range) in &module.scan.attributes {
         match name.as_str() {
             "compute" | "vertex" | "fragment" => {
                 out.push(fault(range, "a file of shaders/common has no entry points".into(), "move it to a node's shader"));
             }
-            "group" => out.push(fault(range, "a file of shaders/common has no bindings".into(), "pass the value to the function as an argument")),
+            "group" => {
+                out.push(fault(range, "a file of shaders/common has no bindings".into(), "pass the value to the function as an argument"))
+            }
             _ => {}
         }
     }

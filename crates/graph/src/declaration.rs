@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 use crate::{
     diagnostics::{Diagnostic, Source, Span},
     expr::{self, ExprAt, RefKind},
-    format,
+    features, format,
     params::{check_identifier, read_params},
     reader::{Reader, Shape, Spanned, head},
     registry::{Direction, Expr, NodeDecl, Over, Param, Port, PortKind, Repeat, Step},
@@ -66,7 +66,13 @@ fn read_node(reader: &mut Reader, tree: &Tree, host: bool) -> Option<Declaration
     let mut requires = Vec::new();
     if let Some(tree) = fields.get("requires") {
         for item in reader.list(tree, "device features") {
-            requires.extend(reader.text(item, "a device feature in quotes").map(|s| s.text));
+            let Some(name) = reader.text(item, "a device feature in quotes") else { continue };
+            if features::DEVICE.contains(&name.text.as_str()) {
+                requires.push(name.text);
+            } else {
+                let help = suggest(&name.text, features::DEVICE.iter().copied());
+                reader.error(&item.range, format!("there is no device feature `{}`", name.text), help);
+            }
         }
     }
     let mut steps = Vec::new();
@@ -91,6 +97,10 @@ fn read_ports(reader: &mut Reader, tree: &Tree, direction: Direction, ports: &mu
     for (name, tree) in reader.map(tree, "ports") {
         check_identifier(reader, &name, "port");
         let Some((kind, optional, doc)) = read_port(reader, tree) else { continue };
+        if direction == Direction::Output && matches!(kind, PortKind::Texture { format: None, .. }) {
+            reader.error(&head(tree), "an output texture needs a format", "add `format: …`");
+            continue;
+        }
         if direction == Direction::Output && matches!(kind, PortKind::Uniform { .. }) {
             reader.error(&head(tree), "a uniform cannot be an output", "write a buffer instead");
         }
@@ -196,6 +206,14 @@ fn read_step(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Step
                 Some(tree) => Some(target(reader, tree, names, true)?),
                 None => None,
             };
+            if let Some(twice) = targets.iter().enumerate().find(|(n, t)| targets[..*n].contains(t)) {
+                reader.error(&head(tree), format!("the step draws to `{}` twice", twice.1), "give each `@location` a port of its own");
+            }
+            if fields.get("depth").is_none()
+                && matches!(fields.get("targets"), Some(Tree { kind: Kind::List(items), .. }) if items.is_empty())
+            {
+                reader.error(&head(tree), "the step draws to nothing", "name an output port in `targets` or `depth`");
+            }
             Some(Step::Draw { vertex: vertex?.text, fragment: fragment?.text, vertices: vertices?, targets, depth, span })
         }
         Some(other) => {
@@ -210,7 +228,7 @@ fn target(reader: &mut Reader, tree: &Tree, names: &Names<'_>, depth: bool) -> O
     let name = reader.text(tree, "the name of an output port in quotes")?;
     let port = find_port(reader, &name, names)?;
     let is_depth = match port.kind {
-        PortKind::Texture { format: Some(format), .. } if port.direction == Direction::Output => {
+        PortKind::Texture { format: Some(format), array: false } if port.direction == Direction::Output && !port.optional => {
             format == crate::value::Format::Depth32Float
         }
         _ => {
@@ -218,7 +236,7 @@ fn target(reader: &mut Reader, tree: &Tree, names: &Names<'_>, depth: bool) -> O
             reader.out.push(
                 Diagnostic::error(format!("`{}` cannot be drawn to", name.text), name.span)
                     .and(span, "declared here")
-                    .help("targets are output textures with a `format`"),
+                    .help("targets are output textures with a `format`, neither optional nor arrays"),
             );
             return None;
         }
@@ -307,7 +325,11 @@ fn read_over(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Over
             Some(if form == "Threads" { Over::Threads(x?, y?, z?) } else { Over::Groups(x?, y?, z?) })
         }
         (form, _) if FORMS.contains(&form) => {
-            let usage = if matches!(form, "Texels" | "Elements") { format!("write `{form}(\"port\")`") } else { format!("write `{form}(x, y, z)`") };
+            let usage = if matches!(form, "Texels" | "Elements") {
+                format!("write `{form}(\"port\")`")
+            } else {
+                format!("write `{form}(x, y, z)`")
+            };
             reader.error(&tree.range, format!("`{form}` is not used like this"), usage);
             None
         }

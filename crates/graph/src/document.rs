@@ -79,8 +79,8 @@ fn read_document(reader: &mut Reader, tree: &Tree, stage: &str) -> Option<Docume
         }
     }
     let params = fields.get("params").map(|t| read_params(reader, t)).unwrap_or_default();
-    let mut gaps = Gaps::default();
-    gaps.params = fields.get("params").map(keys).unwrap_or_default().into_iter().filter(|name| !params.contains_key(name)).collect();
+    let declared = fields.get("params").map(keys).unwrap_or_default();
+    let mut gaps = Gaps { params: declared.into_iter().filter(|name| !params.contains_key(name)).collect(), ..Gaps::default() };
     let mut resources = IndexMap::new();
     if let Some(tree) = fields.get("resources") {
         for (name, tree) in reader.map(tree, "resources") {
@@ -108,7 +108,20 @@ fn read_document(reader: &mut Reader, tree: &Tree, stage: &str) -> Option<Docume
         presents = Some(Spanned { text: String::new(), span: reader.span(&head(tree)) });
     }
     let radiance = text(reader, "radiance", "the name of a resource in quotes");
-    Some(Document { doc, is_stage, head: reader.span(&head(tree)), extends, include, set, params, resources, nodes, presents, radiance, gaps })
+    Some(Document {
+        doc,
+        is_stage,
+        head: reader.span(&head(tree)),
+        extends,
+        include,
+        set,
+        params,
+        resources,
+        nodes,
+        presents,
+        radiance,
+        gaps,
+    })
 }
 
 const TEXTURE: Shape = Shape { what: "Texture", required: &["format", "size"], optional: &["mips", "encoding", "history", "doc"] };
@@ -137,7 +150,11 @@ fn read_resource(reader: &mut Reader, name: &Spanned, tree: &Tree) -> Option<Res
                 None => Some(Encoding::Plain),
             };
             if encoding == Some(Encoding::Octahedral) && format.is_some_and(|f| f != crate::value::Format::R32Uint) {
-                reader.error(&head(tree), format!("`{}` is octahedral, which needs the format R32Uint", name.text), "change the format or the encoding");
+                reader.error(
+                    &head(tree),
+                    format!("`{}` is octahedral, which needs the format R32Uint", name.text),
+                    "change the format or the encoding",
+                );
             }
             (fields, ResourceKind::Texture { format: format?, size: size?, mips: mips?, encoding: encoding? })
         }

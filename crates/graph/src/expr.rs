@@ -88,9 +88,8 @@ pub(crate) fn eval(expr: &Expr, scope: &dyn Scope) -> Result<u64, EvalError> {
     }
 }
 
-const FORMS: &[&str] = &[
-    "Param", "Width", "Height", "Elements", "Mul", "Add", "Min", "Max", "DivCeil", "NextPowerOfTwo", "OutputWidth", "OutputHeight",
-];
+const FORMS: &[&str] =
+    &["Param", "Width", "Height", "Elements", "Mul", "Add", "Min", "Max", "DivCeil", "NextPowerOfTwo", "OutputWidth", "OutputHeight"];
 
 /// Reads an expression.
 pub(crate) fn read(reader: &mut Reader, tree: &Tree) -> Option<ExprAt> {
@@ -175,32 +174,16 @@ fn read_into(reader: &mut Reader, tree: &Tree, refs: &mut Vec<ExprRef>) -> Optio
             None
         }
         Kind::Text(name) => {
-            reader.error(&tree.range, "expected a number or an expression, found a string", format!("write `Param(\"{name}\")` for a parameter"));
+            reader.error(
+                &tree.range,
+                "expected a number or an expression, found a string",
+                format!("write `Param(\"{name}\")` for a parameter"),
+            );
             None
         }
         _ => {
             reader.expected(tree, "a number or an expression", "");
             None
         }
-    }
-}
-
-/// As it is written in RON.
-pub(crate) fn show(expr: &Expr) -> String {
-    let list = |name: &str, items: &[Expr]| format!("{name}([{}])", items.iter().map(show).collect::<Vec<_>>().join(", "));
-    match expr {
-        Expr::Const(v) => v.to_string(),
-        Expr::Param(name) => format!("Param(\"{name}\")"),
-        Expr::OutputWidth => "OutputWidth".into(),
-        Expr::OutputHeight => "OutputHeight".into(),
-        Expr::Width(name) => format!("Width(\"{name}\")"),
-        Expr::Height(name) => format!("Height(\"{name}\")"),
-        Expr::Elements(name) => format!("Elements(\"{name}\")"),
-        Expr::Mul(items) => list("Mul", items),
-        Expr::Add(items) => list("Add", items),
-        Expr::Min(items) => list("Min", items),
-        Expr::Max(items) => list("Max", items),
-        Expr::DivCeil(a, b) => format!("DivCeil({}, {})", show(a), show(b)),
-        Expr::NextPowerOfTwo(a) => format!("NextPowerOfTwo({})", show(a)),
     }
 }

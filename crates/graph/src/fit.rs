@@ -28,7 +28,11 @@ pub(crate) fn external(port: &Port, kind: &PortKind, decl: &NodeDecl, name: &str
             }
             format.and_then(|format| texture(port, *wanted, format, decl, name))
         }
-        (PortKind::Buffer { of: wanted }, PortKind::Buffer { of }) | (PortKind::Uniform { of: wanted }, PortKind::Uniform { of }) if wanted == of => None,
+        (PortKind::Buffer { of: wanted }, PortKind::Buffer { of }) | (PortKind::Uniform { of: wanted }, PortKind::Uniform { of })
+            if wanted == of =>
+        {
+            None
+        }
         (wanted, kind) => Some(format!("it is {}, not {}", describe(kind), describe(wanted))),
     }
 }
@@ -49,7 +53,9 @@ fn texture(port: &Port, wanted: Option<Format>, format: Format, decl: &NodeDecl,
     }
     let feature = decl.requires.iter().any(|r| r == "FLOAT32_FILTERABLE");
     if port.direction == Direction::Input && filtered && format.is_float32() && !feature {
-        return Some(format!("it is sampled with a filter, and {format} cannot be without `requires: [\"FLOAT32_FILTERABLE\"]` in the node"));
+        return Some(format!(
+            "it is sampled with a filter, and {format} cannot be without `requires: [\"FLOAT32_FILTERABLE\"]` in the node"
+        ));
     }
     None
 }

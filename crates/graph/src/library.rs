@@ -123,7 +123,12 @@ impl Library {
     }
 
     /// Finds a document that another one names: relative to it, then in `pipelines/`.
-    pub(crate) fn find_beside(&self, from: &Source, from_path: Option<&str>, name: &str) -> Result<(Arc<Source>, Option<String>), ReadError> {
+    pub(crate) fn find_beside(
+        &self,
+        from: &Source,
+        from_path: Option<&str>,
+        name: &str,
+    ) -> Result<(Arc<Source>, Option<String>), ReadError> {
         if let Some(folder) = from.path.as_ref().and_then(|p| p.parent()) {
             let file = PathBuf::from(normal(&folder.join(name).to_string_lossy().replace('\\', "/")));
             match Self::read_file(&file) {

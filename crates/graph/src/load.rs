@@ -18,6 +18,8 @@ use crate::{
 };
 
 const COMMON: &str = "shaders/common/";
+/// Bytes; only what is used costs memory.
+const STACK: usize = 64 << 20;
 
 impl Registry {
     /// Reads every node: host declarations and pairs of `.ron` and `.wgsl` in the library's `shaders/`.
@@ -28,6 +30,15 @@ impl Registry {
 
     /// Loads again. Shaders whose text and imports are the same are taken over (`Arc::ptr_eq`).
     pub fn reload(&self, library: &Library, host: &[HostDecl], externals: Vec<External>) -> (Self, Diagnostics) {
+        // Parsers of WGSL recurse: with room to do so, an odd text is a fault and not the end of the program.
+        let roomy = std::thread::Builder::new().name("shader registry".into()).stack_size(STACK);
+        std::thread::scope(|scope| match roomy.spawn_scoped(scope, || self.load_all(library, host, externals.clone())) {
+            Ok(handle) => handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+            Err(_) => self.load_all(library, host, externals.clone()),
+        })
+    }
+
+    fn load_all(&self, library: &Library, host: &[HostDecl], externals: Vec<External>) -> (Self, Diagnostics) {
         let mut out = Vec::new();
         let mut commons = Vec::new();
         for path in library.list("shaders/common", "wgsl") {
@@ -37,9 +48,18 @@ impl Registry {
             }
         }
         for path in library.list("shaders/common", "ron") {
-            out.push(Diagnostic::error_nowhere(format!("`{path}` declares a node in shaders/common")).help("move it and its shader to a stage's folder"));
+            out.push(
+                Diagnostic::error_nowhere(format!("`{path}` declares a node in shaders/common"))
+                    .help("move it and its shader to a stage's folder"),
+            );
         }
-        let mut loader = Loader { library, old: self, new: Registry::default(), composition: Composition::new(commons, &self.good_modules, &mut out), out };
+        let mut loader = Loader {
+            library,
+            old: self,
+            new: Registry::default(),
+            composition: Composition::new(commons, &self.good_modules, &mut out),
+            out,
+        };
         for external in externals {
             loader.new.externals.insert(external.name.clone(), external);
         }
@@ -174,7 +194,9 @@ impl Loader<'_> {
                 for (global, reason) in &found.faults {
                     let item = resolved.scan.item("var", global).or_else(|| resolved.scan.item("fn", global));
                     let range = item.map_or(0..0, |i| i.range.clone());
-                    self.out.push(Diagnostic::error(format!("`{global}` cannot be used in a node"), Span::new(source, range)).help(reason.clone()));
+                    self.out.push(
+                        Diagnostic::error(format!("`{global}` cannot be used in a node"), Span::new(source, range)).help(reason.clone()),
+                    );
                 }
                 if !found.faults.is_empty() {
                     return None;
@@ -262,7 +284,9 @@ fn difference(expected: &Layout, found: &Layout) -> Option<String> {
     for (index, wanted) in expected.members.iter().enumerate() {
         match found.members.get(index) {
             None => return Some(format!("it lacks the member `{}`", wanted.name)),
-            Some(member) if member.name != wanted.name => return Some(format!("member {index} is `{}` instead of `{}`", member.name, wanted.name)),
+            Some(member) if member.name != wanted.name => {
+                return Some(format!("member {index} is `{}` instead of `{}`", member.name, wanted.name));
+            }
             Some(member) if member.offset != wanted.offset => {
                 return Some(format!("`{}` is at byte {} instead of {}", member.name, member.offset, wanted.offset));
             }

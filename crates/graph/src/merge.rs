@@ -82,7 +82,11 @@ impl Loader<'_> {
         let document = document::read(source, &stem(&source.name), &mut self.out)?;
         if document.is_stage != as_stage {
             let message = if as_stage { "a pipeline cannot be included" } else { "a stage is no pipeline" };
-            let help = if as_stage { "name it as `extends`, or make it a Stage(…)" } else { "name a pipeline that includes it, or make it a Pipeline(…)" };
+            let help = if as_stage {
+                "name it as `extends`, or make it a Stage(…)"
+            } else {
+                "name a pipeline that includes it, or make it a Pipeline(…)"
+            };
             self.out.push(Diagnostic::error(message, document.head.clone()).help(help));
             return None;
         }

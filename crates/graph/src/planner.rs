@@ -2,8 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use petgraph::graph::{EdgeIndex, NodeIndex};
-
 use crate::{
     assign::Values,
     diagnostics::{Diagnostic, Diagnostics, Severity, Span},
@@ -11,7 +9,6 @@ use crate::{
     pipeline::Pipeline,
     plan::{Idle, IdleNode, Lifetime, Plan, PlanInput, PlanNode, PlanResource, Target, Usage},
     registry::{Direction, Registry, Step},
-    render::suggest,
     resolve::{Linked, Wire, link},
     sizes::{LARGEST_SIDE, Sizes},
     slots,
@@ -32,7 +29,10 @@ pub fn plan(pipeline: &Pipeline, registry: &Registry, input: &PlanInput) -> Resu
     let linked = link(pipeline, registry, input.features.keys().map(String::as_str).collect(), &mut out);
     for node in linked.nodes.iter().filter(|n| registry.faulty.contains(&n.usage.node.text)) {
         let name = &node.usage.node.text;
-        let fault = Diagnostic::error(format!("the node `{name}` cannot be used: its declaration or shader has faults"), node.usage.node.span.clone());
+        let fault = Diagnostic::error(
+            format!("the node `{name}` cannot be used: its declaration or shader has faults"),
+            node.usage.node.span.clone(),
+        );
         out.push(fault.help("mend those first; `check` shows them"));
     }
     let values = Values::assign(&linked, &input.set, &mut out);
@@ -44,6 +44,8 @@ pub fn plan(pipeline: &Pipeline, registry: &Registry, input: &PlanInput) -> Resu
         _ => Err(Diagnostic::error_nowhere(format!("the pipeline `{}` cannot be planned", pipeline.name)).into()),
     }
 }
+
+mod live;
 
 /// An edge of the graph: the consumer's document index and where it names the resource.
 #[derive(Debug, Clone, Copy)]
@@ -82,188 +84,13 @@ impl<'a> Planner<'a, '_> {
         if cyclic || faults > before { None } else { plan }
     }
 
-    fn activity(&mut self) -> Activity<'a> {
-        let get = |name: &str| self.values.get(name).cloned();
-        let off: Vec<Option<String>> = self
-            .linked
-            .nodes
-            .iter()
-            .map(|node| {
-                let verdict = node.usage.when.as_ref()?.eval(&get, &self.input.features);
-                (!verdict.holds).then_some(verdict.why)
-            })
-            .collect();
-        let mut producer: BTreeMap<&'a str, usize> = BTreeMap::new();
-        for (index, node) in self.linked.nodes.iter().enumerate().filter(|(index, _)| off[*index].is_none()) {
-            for (_, port, wire) in node.ports() {
-                let (Direction::Output, Wire::Resource { name, span, .. }) = (port.direction, wire) else { continue };
-                match producer.get(name) {
-                    Some(other) if *other != index => {
-                        let other = &self.linked.nodes[*other].usage.id;
-                        self.out.push(
-                            Diagnostic::error(format!("`{name}` is written by two nodes: `{}` and `{}`", other.text, node.usage.id.text), span.clone())
-                                .and(other.span.clone(), "the other one")
-                                .help("give them conditions that exclude each other, or resources of their own"),
-                        );
-                    }
-                    _ => {
-                        producer.insert(name, index);
-                    }
-                }
-            }
-        }
-        Activity { off, producer }
-    }
-
-    /// Resources that a node reads, with the last frame's told apart.
-    fn reads(&self, node: usize) -> impl Iterator<Item = (&'a str, bool, bool, &'a Span)> + use<'a> {
-        let reads: Vec<_> = self.linked.nodes[node]
-            .ports()
-            .filter_map(|(_, port, wire)| match (port.direction, wire) {
-                (Direction::Input, Wire::Resource { name, previous, span }) => Some((name, previous, port.optional, span)),
-                _ => None,
-            })
-            .collect();
-        reads.into_iter()
-    }
-
-    fn dag(&self, activity: &Activity<'a>) -> Dag<Read<'a>> {
-        let mut dag = Dag::with_capacity(self.linked.nodes.len(), self.linked.nodes.len() * 4);
-        for index in 0..self.linked.nodes.len() {
-            dag.add_node(index);
-        }
-        for (index, _) in activity.off.iter().enumerate().filter(|(_, off)| off.is_none()) {
-            for (resource, previous, _, span) in self.reads(index) {
-                if let (false, Some(from)) = (previous, activity.producer.get(resource)) {
-                    dag.update_edge(NodeIndex::new(*from), NodeIndex::new(index), Read { resource, span });
-                }
-            }
-        }
-        dag
-    }
-
-    fn cycles(&mut self, dag: &Dag<Read<'a>>) -> bool {
-        let cycles = order::cycles(dag);
-        for cycle in &cycles {
-            let id = |n: NodeIndex| self.linked.nodes[dag[n]].usage.id.text.as_str();
-            let next = |at: usize| cycle[(at + 1) % cycle.len()];
-            let edge = |at: usize| -> Option<Read<'a>> {
-                let edge: EdgeIndex = dag.find_edge(cycle[at], next(at))?;
-                dag.edge_weight(edge).copied()
-            };
-            let names: Vec<&str> = (0..=cycle.len()).map(|at| id(cycle[at % cycle.len()])).collect();
-            let message = if cycle.len() == 1 {
-                format!("node `{}` reads what it writes itself", names[0])
-            } else {
-                format!("nodes wait for each other in a cycle: {}", names.join(" → "))
-            };
-            let mut labels = (0..cycle.len()).filter_map(|at| edge(at).map(|read| (at, read)));
-            let Some((at, first)) = labels.next() else { continue };
-            let say = |at: usize, read: &Read<'_>| format!("`{}` reads `{}`, which `{}` writes", id(next(at)), read.resource, id(cycle[at]));
-            let mut fault = Diagnostic::error(message, first.span.clone()).at(say(at, &first));
-            for (at, read) in labels {
-                fault = fault.and(read.span.clone(), say(at, &read));
-            }
-            self.out.push(fault.help("read the last frame's value with Previous(\"…\") in one place, or write to another resource"));
-        }
-        !cycles.is_empty()
-    }
-
-    /// Nodes that feed what is shown or kept. Reading what nobody writes is a fault for these.
-    fn live(&mut self, activity: &Activity<'a>) -> BTreeSet<usize> {
-        let mut wanted: Vec<usize> = Vec::new();
-        let pipeline = self.linked.pipeline;
-        let shown = [Some(&pipeline.presents), pipeline.radiance.as_ref()];
-        for name in shown.into_iter().flatten() {
-            match activity.producer.get(name.text.as_str()) {
-                Some(node) => wanted.push(*node),
-                None => self.unproduced(&name.text, &name.span, "", activity),
-            }
-        }
-        for name in &self.input.keep {
-            if !pipeline.resources.contains_key(name) {
-                let help = suggest(name, pipeline.resources.keys().map(String::as_str));
-                self.out.push(Diagnostic::error_nowhere(format!("the pipeline `{}` has no resource `{name}`", pipeline.name)).help(help));
-            } else if let Some(node) = activity.producer.get(name.as_str()) {
-                wanted.push(*node);
-            } else {
-                let why = self.producers_off(name, activity);
-                self.out.push(Diagnostic::error_nowhere(format!("`{name}` is not written in this frame{why}")).help("set the parameters so that it is"));
-            }
-        }
-        let mut live = BTreeSet::new();
-        let mut said = BTreeSet::new();
-        while let Some(node) = wanted.pop() {
-            if !live.insert(node) {
-                continue;
-            }
-            for (resource, _, optional, span) in self.reads(node) {
-                match activity.producer.get(resource) {
-                    Some(from) => wanted.push(*from),
-                    None if optional => {}
-                    None => {
-                        if said.insert((node, resource)) {
-                            let id = &self.linked.nodes[node].usage.id.text;
-                            self.unproduced(resource, span, &format!("`{id}` reads it"), activity);
-                        }
-                    }
-                }
-            }
-        }
-        live
-    }
-
-    /// With culling off: live nodes, and all others that have what they need.
-    fn runnable(&self, activity: &Activity<'a>, live: &BTreeSet<usize>) -> BTreeSet<usize> {
-        let mut runs: BTreeSet<usize> = (0..self.linked.nodes.len()).filter(|n| activity.off[*n].is_none() && self.linked.nodes[*n].decl.is_some()).collect();
-        loop {
-            let lacking: Vec<usize> = runs
-                .iter()
-                .copied()
-                .filter(|n| !live.contains(n))
-                .filter(|n| self.reads(*n).any(|(r, _, optional, _)| !optional && activity.producer.get(r).is_none_or(|p| !runs.contains(p))))
-                .collect();
-            if lacking.is_empty() {
-                return runs;
-            }
-            lacking.iter().for_each(|n| {
-                runs.remove(n);
-            });
-        }
-    }
-
-    fn producers_off(&self, resource: &str, activity: &Activity<'a>) -> String {
-        let mut reasons = Vec::new();
-        for (index, node) in self.linked.nodes.iter().enumerate() {
-            let writes = node.ports().any(|(_, port, wire)| port.direction == Direction::Output && matches!(wire, Wire::Resource { name, .. } if name == resource));
-            if let (true, Some(why)) = (writes, &activity.off[index]) {
-                reasons.push(format!("node `{}`, which writes it, is off: {why}", node.usage.id.text));
-            }
-        }
-        if reasons.is_empty() { String::new() } else { format!(": {}", reasons.join("; ")) }
-    }
-
-    fn unproduced(&mut self, resource: &str, span: &Span, reader: &str, activity: &Activity<'a>) {
-        if self.linked.tainted.contains(resource) {
-            return;
-        }
-        let why = self.producers_off(resource, activity);
-        if why.is_empty() && self.linked.incomplete {
-            return;
-        }
-        let producers = self.linked.nodes.iter().filter(|node| {
-            node.usage.when.is_some() && node.ports().any(|(_, p, w)| p.direction == Direction::Output && matches!(w, Wire::Resource { name, .. } if name == resource))
-        });
-        let mut fault = Diagnostic::error(format!("`{resource}` is read, but not written in this frame{why}"), span.clone()).at(reader);
-        for node in producers {
-            if let Some(when) = &node.usage.when {
-                fault = fault.and(when.span.clone(), format!("the condition of `{}`", node.usage.id.text));
-            }
-        }
-        self.out.push(fault.help("give the reader the same condition, or let another node write it otherwise"));
-    }
-
-    fn assemble(&mut self, activity: &Activity<'a>, dag: &Dag<Read<'a>>, runs: &BTreeSet<usize>, sizes: &mut Sizes<'a, '_>) -> Option<Plan> {
+    fn assemble(
+        &mut self,
+        activity: &Activity<'a>,
+        dag: &Dag<Read<'a>>,
+        runs: &BTreeSet<usize>,
+        sizes: &mut Sizes<'a, '_>,
+    ) -> Option<Plan> {
         let kept_dag = dag.filter_map(|_, n| runs.contains(n).then_some(*n), |_, e| Some(*e));
         let order = order::sort(&kept_dag, self.input.debug.shuffle);
         let mut table = Table::default();

@@ -191,7 +191,11 @@ impl Reader {
             Kind::Name(_) => &[],
             Kind::Tuple(_, items) => {
                 let names: Vec<String> = optional.iter().chain(required).map(|name| format!("`{name}: …`")).collect();
-                self.error(&items[0].range, format!("{what} takes named fields"), format!("put the name before the value: {}", names.join(", ")));
+                self.error(
+                    &items[0].range,
+                    format!("{what} takes named fields"),
+                    format!("put the name before the value: {}", names.join(", ")),
+                );
                 return None;
             }
             _ => {
@@ -208,7 +212,9 @@ impl Reader {
                 let first = self.span(&first.range);
                 let span = self.span(&name.range);
                 self.out.push(
-                    Diagnostic::error(format!("`{}` is given twice", name.text), span).and(first, "first given here").help("remove one of them"),
+                    Diagnostic::error(format!("`{}` is given twice", name.text), span)
+                        .and(first, "first given here")
+                        .help("remove one of them"),
                 );
             } else {
                 found.push((name, value));

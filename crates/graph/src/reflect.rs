@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use naga::{
-    AddressSpace, ArraySize, Handle, ImageClass, ImageDimension, Module, ScalarKind, ShaderStage, StorageAccess, StorageFormat, Type, TypeInner,
+    AddressSpace, ArraySize, Handle, ImageClass, ImageDimension, Module, ScalarKind, ShaderStage, StorageAccess, StorageFormat, Type,
+    TypeInner,
     valid::{GlobalUse, ModuleInfo},
 };
 
@@ -47,7 +48,8 @@ pub(crate) fn canonical_type(name: &str) -> String {
 
 /// Reads a validated module.
 pub(crate) fn reflect(module: &Module, info: &ModuleInfo, scan: &Scan) -> Reflection {
-    let mut out = Reflection { globals: Vec::new(), entries: Vec::new(), overrides: Vec::new(), layouts: BTreeMap::new(), faults: Vec::new() };
+    let mut out =
+        Reflection { globals: Vec::new(), entries: Vec::new(), overrides: Vec::new(), layouts: BTreeMap::new(), faults: Vec::new() };
     let mut index_of = BTreeMap::new();
     for (handle, variable) in module.global_variables.iter() {
         let Some(binding) = variable.binding else { continue };
@@ -89,6 +91,12 @@ pub(crate) fn reflect(module: &Module, info: &ModuleInfo, scan: &Scan) -> Reflec
                 continue;
             }
         };
+        if stage == Stage::Vertex && has_attributes(module, entry) {
+            out.faults.push((
+                entry.name.clone(),
+                "there are no vertex attributes: read vertices from a buffer by `@builtin(vertex_index)`".into(),
+            ));
+        }
         let workgroup_size = if stage == Stage::Compute { entry.workgroup_size } else { [1; 3] };
         if entry.workgroup_size_overrides.is_some_and(|o| o.iter().any(Option::is_some)) {
             out.faults.push((entry.name.clone(), "the workgroup size is an override; write numbers or a `const`".into()));
@@ -102,6 +110,15 @@ pub(crate) fn reflect(module: &Module, info: &ModuleInfo, scan: &Scan) -> Reflec
         }
     }
     out
+}
+
+/// Whether a vertex entry point takes `@location` inputs.
+fn has_attributes(module: &Module, entry: &naga::EntryPoint) -> bool {
+    let located = |binding: &Option<naga::Binding>| matches!(binding, Some(naga::Binding::Location { .. }));
+    entry.function.arguments.iter().any(|argument| match &module.types[argument.ty].inner {
+        TypeInner::Struct { members, .. } => members.iter().any(|m| located(&m.binding)),
+        _ => located(&argument.binding),
+    })
 }
 
 /// The `@location` outputs of a fragment entry point, in order: what kind of number each writes.
@@ -151,9 +168,13 @@ fn global_kind(module: &Module, space: AddressSpace, ty: Handle<Type>) -> Result
         (AddressSpace::Storage { access: declared }, TypeInner::Array { base, size: ArraySize::Dynamic, stride }) => {
             Ok(GlobalKind::Storage { element: type_name(module, *base), stride: *stride, access: access(declared) })
         }
-        (AddressSpace::Storage { .. }, _) => Err(format!("a storage buffer is an array without length: write `array<{}>`", type_name(module, ty))),
+        (AddressSpace::Storage { .. }, _) => {
+            Err(format!("a storage buffer is an array without length: write `array<{}>`", type_name(module, ty)))
+        }
         (AddressSpace::Handle, TypeInner::Sampler { comparison: false }) => Ok(GlobalKind::Sampler),
-        (AddressSpace::Handle, TypeInner::Sampler { comparison: true }) => Err("comparison samplers are not provided: compare in the shader".into()),
+        (AddressSpace::Handle, TypeInner::Sampler { comparison: true }) => {
+            Err("comparison samplers are not provided: compare in the shader".into())
+        }
         (AddressSpace::Handle, TypeInner::Image { dim: ImageDimension::D2, arrayed, class }) => image_kind(*arrayed, class),
         (AddressSpace::Handle, TypeInner::Image { .. }) => Err("only 2D textures and arrays of them are supported".into()),
         _ => Err("this kind of variable cannot be bound".into()),
@@ -162,7 +183,9 @@ fn global_kind(module: &Module, space: AddressSpace, ty: Handle<Type>) -> Result
 
 fn image_kind(array: bool, class: &ImageClass) -> Result<GlobalKind, String> {
     match class {
-        ImageClass::Sampled { multi: true, .. } | ImageClass::Depth { multi: true } => Err("multisampled textures are not supported".into()),
+        ImageClass::Sampled { multi: true, .. } | ImageClass::Depth { multi: true } => {
+            Err("multisampled textures are not supported".into())
+        }
         ImageClass::Sampled { kind, .. } => {
             let sample = match kind {
                 ScalarKind::Uint => SampleKind::Uint,

@@ -18,6 +18,9 @@ pub const LARGEST_SIDE: u64 = 16_384;
 /// The largest buffer in bytes.
 pub const LARGEST_BUFFER: u64 = 1 << 31;
 
+/// Sizes may refer to sizes this often.
+pub(crate) const LONGEST_CHAIN: usize = 256;
+
 /// Descriptions by name, computed on demand.
 pub(crate) struct Sizes<'a, 'p> {
     linked: &'p Linked<'a>,
@@ -25,11 +28,13 @@ pub(crate) struct Sizes<'a, 'p> {
     input: &'p PlanInput,
     /// `None` for a resource without a size, whose fault is reported.
     known: BTreeMap<&'a str, Option<ResourceDesc>>,
+    /// Resources whose sizes are being computed.
+    depth: usize,
 }
 
 impl<'a, 'p> Sizes<'a, 'p> {
     pub fn new(linked: &'p Linked<'a>, values: &'p Values<'a>, input: &'p PlanInput) -> Self {
-        Self { linked, values, input, known: BTreeMap::new() }
+        Self { linked, values, input, known: BTreeMap::new(), depth: 0 }
     }
 
     /// The description of a resource or external.
@@ -40,7 +45,17 @@ impl<'a, 'p> Sizes<'a, 'p> {
         // Resources whose sizes need each other are tainted and never come here twice.
         self.known.insert(name, None);
         let found = match self.linked.pipeline.resources.get(name) {
-            Some(resource) => self.resource(name, resource, out),
+            Some(resource) if self.depth < LONGEST_CHAIN => {
+                self.depth += 1;
+                let found = self.resource(name, resource, out);
+                self.depth -= 1;
+                found
+            }
+            Some(resource) => {
+                let message = format!("sizes refer to each other through more than {LONGEST_CHAIN} resources");
+                out.push(Diagnostic::error(message, resource.span.clone()).help("give some of them sizes of their own"));
+                None
+            }
             None => self.external(name, out),
         };
         self.known.insert(name, found.clone());
@@ -77,10 +92,14 @@ impl<'a, 'p> Sizes<'a, 'p> {
                     return None;
                 }
                 match count_value.checked_mul(stride.into()) {
-                    Some(bytes) if bytes <= LARGEST_BUFFER => Some(ResourceDesc::Buffer { element: of.clone(), stride, count: count_value }),
+                    Some(bytes) if bytes <= LARGEST_BUFFER => {
+                        Some(ResourceDesc::Buffer { element: of.clone(), stride, count: count_value })
+                    }
                     bytes => {
                         let bytes = bytes.map_or_else(|| "more than 2^64".to_owned(), |b| b.to_string());
-                        let message = format!("the buffer `{name}` is too large: {count_value} elements of {stride} bytes are {bytes} bytes, more than {LARGEST_BUFFER}");
+                        let message = format!(
+                            "the buffer `{name}` is too large: {count_value} elements of {stride} bytes are {bytes} bytes, more than {LARGEST_BUFFER}"
+                        );
                         out.push(Diagnostic::error(message, count.span.clone()).help(self.remedy("lower", "the count", &count.refs)));
                         None
                     }
@@ -133,7 +152,11 @@ impl<'a, 'p> Sizes<'a, 'p> {
         }
         if width > LARGEST_SIDE || height > LARGEST_SIDE {
             let message = format!("the texture `{name}` is too large: {width}×{height} texels, more than {LARGEST_SIDE} a side");
-            let remedy = if matches!(size, Size::Output | Size::OutputScaled(..)) { "render a smaller picture".into() } else { self.remedy("lower", "the size", &refs) };
+            let remedy = if matches!(size, Size::Output | Size::OutputScaled(..)) {
+                "render a smaller picture".into()
+            } else {
+                self.remedy("lower", "the size", &refs)
+            };
             out.push(Diagnostic::error(message, place.clone()).help(remedy));
             return None;
         }
@@ -267,7 +290,8 @@ fn same_kind(kind: &PortKind, desc: &ResourceDesc) -> bool {
         (PortKind::Texture { format, array }, ResourceDesc::Texture { format: given, array: is_array, .. }) => {
             array == is_array && format.is_none_or(|f| f == *given)
         }
-        (PortKind::Buffer { of }, ResourceDesc::Buffer { element, .. }) | (PortKind::Uniform { of }, ResourceDesc::Uniform { element, .. }) => of == element,
+        (PortKind::Buffer { of }, ResourceDesc::Buffer { element, .. })
+        | (PortKind::Uniform { of }, ResourceDesc::Uniform { element, .. }) => of == element,
         _ => false,
     }
 }

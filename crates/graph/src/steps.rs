@@ -74,9 +74,14 @@ pub(crate) fn unroll(id: &str, scope: &NodeScope<'_>, out: &mut Vec<Diagnostic>)
                     format!("has {}×{}×{} workgroups, more than {MOST_GROUPS} in a dimension", groups[0], groups[1], groups[2]),
                     "lower the size, or spread the work over more dimensions",
                 ),
-                StepError::Repeats(count) => {
-                    fault(format!("is repeated {count} times, more than {MOST_REPEATS}"), "lower the parameter, or do more work in a repetition")
-                }
+                StepError::Repeats(count) => fault(
+                    format!("is repeated {count} times, more than {MOST_REPEATS}"),
+                    "lower the parameter, or do more work in a repetition",
+                ),
+                StepError::Targets([(a, size), (b, other)]) => fault(
+                    format!("draws to `{a}` with {}×{} and to `{b}` with {}×{} texels", size.0, size.1, other.0, other.1),
+                    "give the resources of all targets one size",
+                ),
                 StepError::Vertices(count) => fault(format!("draws {count} vertices, more than 2^32"), "draw fewer triangles"),
             });
         }
@@ -89,6 +94,8 @@ enum StepError {
     Groups([u64; 3]),
     Repeats(u64),
     Vertices(u64),
+    /// Two targets with their sizes.
+    Targets([(String, (u32, u32)); 2]),
 }
 
 impl From<EvalError> for StepError {
@@ -114,7 +121,9 @@ fn unroll_step(step: &Step, scope: &NodeScope<'_>, steps: &mut Vec<PlanStep>) ->
             match repeat {
                 None => push(0, None),
                 Some(Repeat::Down(port)) => (1..levels(port)).try_for_each(|level| push(level, Some((port.clone(), level)))),
-                Some(Repeat::Up(port)) => (0..levels(port).saturating_sub(1)).rev().try_for_each(|level| push(level, Some((port.clone(), level)))),
+                Some(Repeat::Up(port)) => {
+                    (0..levels(port).saturating_sub(1)).rev().try_for_each(|level| push(level, Some((port.clone(), level))))
+                }
                 Some(Repeat::Times(count)) => {
                     let count = expr::eval(count, scope)?;
                     if count > MOST_REPEATS {
@@ -127,8 +136,14 @@ fn unroll_step(step: &Step, scope: &NodeScope<'_>, steps: &mut Vec<PlanStep>) ->
         Step::Draw { vertex, fragment, vertices, targets, depth, .. } => {
             let vertices = expr::eval(vertices, scope)?;
             let vertices = u32::try_from(vertices).map_err(|_| StepError::Vertices(vertices))?;
+            let sized = |port: &String| scope.texture(port).map(|size| (port.clone(), size));
+            let mut all = targets.iter().chain(depth).filter_map(sized);
+            if let Some(first) = all.next()
+                && let Some(other) = all.find(|(_, size)| *size != first.1)
+            {
+                return Err(StepError::Targets([first, other]));
+            }
             let resource = |port: &String| scope.ports.get(port.as_str()).map(|(ix, _)| *ix);
-            // Unconnected optional targets are refused when the node is linked.
             let targets = targets.iter().filter_map(resource).collect();
             let depth = depth.as_ref().and_then(resource);
             steps.push(PlanStep::Draw { vertex: vertex.clone(), fragment: fragment.clone(), vertices, targets, depth });

@@ -106,7 +106,9 @@ pub(crate) fn parse(source: &Arc<Source>, out: &mut Vec<Diagnostic>) -> Option<T
         return None;
     }
     if document.value.is_none() {
-        out.push(Diagnostic::error("the file is empty", Span::new(source, 0..0)).help("see the other files of its folder for what belongs here"));
+        out.push(
+            Diagnostic::error("the file is empty", Span::new(source, 0..0)).help("see the other files of its folder for what belongs here"),
+        );
     }
     document.value.as_ref().map(tree)
 }
@@ -203,11 +205,8 @@ fn check_brackets(source: &Arc<Source>) -> Result<(), Diagnostic> {
                         .and(Span::new(source, start..start + 1), "opened here"));
                     }
                     None => {
-                        return Err(Diagnostic::error(
-                            format!("`{}` closes nothing", char::from(bracket)),
-                            Span::new(source, at..at + 1),
-                        )
-                        .help("remove it, or open the bracket that it belongs to"));
+                        return Err(Diagnostic::error(format!("`{}` closes nothing", char::from(bracket)), Span::new(source, at..at + 1))
+                            .help("remove it, or open the bracket that it belongs to"));
                     }
                 }
                 at += 1;
@@ -217,13 +216,12 @@ fn check_brackets(source: &Arc<Source>) -> Result<(), Diagnostic> {
     }
     match open.pop() {
         None => Ok(()),
-        Some((opened, start)) => Err(Diagnostic::error(
-            format!("`{}` is never closed", char::from(opened)),
-            Span::new(source, start..start + 1),
-        )
-        .at("opened here")
-        .and(Span::new(source, text.len()..text.len()), "the file ends here")
-        .help(format!("add the missing `{}`", closing(opened)))),
+        Some((opened, start)) => {
+            Err(Diagnostic::error(format!("`{}` is never closed", char::from(opened)), Span::new(source, start..start + 1))
+                .at("opened here")
+                .and(Span::new(source, text.len()..text.len()), "the file ends here")
+                .help(format!("add the missing `{}`", closing(opened))))
+        }
     }
 }
 

@@ -35,7 +35,11 @@ pub(crate) fn find(linked: &Linked<'_>) -> Vec<Diagnostic> {
             ResourceKind::Buffer { count, .. } => exprs.push(count),
         }
         for r in exprs.iter().flat_map(|e| &e.refs) {
-            if r.kind == RefKind::Param { params.insert(&r.name.text) } else { resources.insert(&r.name.text) };
+            if r.kind == RefKind::Param {
+                params.insert(&r.name.text)
+            } else {
+                resources.insert(&r.name.text)
+            };
         }
     }
     for node in &linked.nodes {
@@ -51,14 +55,20 @@ pub(crate) fn find(linked: &Linked<'_>) -> Vec<Diagnostic> {
         }
         if let Some(when) = &node.usage.when {
             when.leaves(&mut |leaf| {
-                if let ConditionKind::Is(name, _) | ConditionKind::IsOn(name) | ConditionKind::AtLeast(name, _) | ConditionKind::Below(name, _) = &leaf.kind {
+                if let ConditionKind::Is(name, _)
+                | ConditionKind::IsOn(name)
+                | ConditionKind::AtLeast(name, _)
+                | ConditionKind::Below(name, _) = &leaf.kind
+                {
                     params.insert(&name.text);
                 }
             });
         }
     }
     let mut out = Vec::new();
-    for (name, resource) in linked.pipeline.resources.iter().filter(|(n, _)| !resources.contains(n.as_str()) && !linked.tainted.contains(*n)) {
+    for (name, resource) in
+        linked.pipeline.resources.iter().filter(|(n, _)| !resources.contains(n.as_str()) && !linked.tainted.contains(*n))
+    {
         out.push(Diagnostic::warning(format!("nothing uses the resource `{name}`"), resource.span.clone()).help("connect it or remove it"));
     }
     for (name, param) in linked.pipeline.params.iter().filter(|(n, _)| !params.contains(n.as_str())) {

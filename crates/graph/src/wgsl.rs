@@ -228,6 +228,50 @@ fn read_import(tokens: &[(Token<'_>, Range<usize>)], mut at: usize, scan: &mut S
     at
 }
 
+/// Brackets, signs, templates and `else if` may be nested this deep; parsers of WGSL recurse over them.
+const DEEPEST_NESTING: usize = 120;
+/// A statement may have this many operators.
+const LONGEST_STATEMENT: usize = 4000;
+
+/// The place where a text is nested too deeply to be parsed, and what is.
+pub(crate) fn too_deep(text: &str) -> Option<(Range<usize>, &'static str)> {
+    let tokens: Vec<_> = tokens(text).into_iter().filter(|(t, _)| *t != Token::Mark(b'\n')).collect();
+    let (mut brackets, mut signs, mut templates, mut elses, mut operators) = (0usize, 0usize, 0usize, 0usize, 0usize);
+    for (index, (token, range)) in tokens.iter().enumerate() {
+        let before = index.checked_sub(1).map(|i| tokens[i].0);
+        match token {
+            Token::Mark(b'(' | b'[' | b'{') => brackets += 1,
+            Token::Mark(b')' | b']' | b'}') => brackets = brackets.saturating_sub(1),
+            _ => {}
+        }
+        signs = if matches!(token, Token::Mark(b'-' | b'!' | b'~' | b'&' | b'*')) { signs + 1 } else { 0 };
+        match token {
+            Token::Mark(b'<') => templates += 1,
+            Token::Mark(b'>' | b';' | b'{' | b'=') => templates = 0,
+            _ => {}
+        }
+        match token {
+            Token::Word("else") => elses += 1,
+            // An `if` that does not follow `else` starts a new chain.
+            Token::Word("if") if before != Some(Token::Word("else")) => elses = 0,
+            _ => {}
+        }
+        operators = match token {
+            Token::Mark(b';' | b'{' | b'}') => 0,
+            Token::Mark(b'+' | b'-' | b'*' | b'/' | b'%' | b'&' | b'|' | b'^' | b'<' | b'>' | b'.') => operators + 1,
+            _ => operators,
+        };
+        let deepest = [(brackets, "brackets"), (signs, "operators"), (templates, "types"), (elses, "`else` branches")];
+        if let Some((_, what)) = deepest.into_iter().find(|(depth, _)| *depth > DEEPEST_NESTING) {
+            return Some((range.clone(), what));
+        }
+        if operators > LONGEST_STATEMENT {
+            return Some((range.clone(), "operators"));
+        }
+    }
+    None
+}
+
 /// The place of a structure's member.
 pub(crate) fn member(text: &str, structure: &str, member: &str) -> Option<Range<usize>> {
     let tokens = tokens(text);
@@ -302,7 +346,10 @@ fn words(line: &str) -> Vec<Range<usize>> {
             continue;
         }
         let start = at;
-        while at < bytes.len() && (word(bytes[at]) || (bytes[at] == b':' && bytes.get(at + 1) == Some(&b':') || (bytes[at] == b':' && at > start && bytes[at - 1] == b':'))) {
+        while at < bytes.len()
+            && (word(bytes[at])
+                || (bytes[at] == b':' && bytes.get(at + 1) == Some(&b':') || (bytes[at] == b':' && at > start && bytes[at - 1] == b':')))
+        {
             at += 1;
         }
         found.push(start..at);
@@ -326,9 +373,13 @@ mod tests {
 
     #[test]
     fn imports_are_expanded() {
-        let text = "#import common::cluster::{Cluster, form_factor as ff}\n#import common::{math, noise::{hash}}\nlet a = common::other::f();";
+        let text =
+            "#import common::cluster::{Cluster, form_factor as ff}\n#import common::{math, noise::{hash}}\nlet a = common::other::f();";
         let paths: Vec<_> = scan(text).paths.into_iter().map(|p| p.text).collect();
-        assert_eq!(paths, ["common::cluster::Cluster", "common::cluster::form_factor", "common::math", "common::noise::hash", "common::other::f"]);
+        assert_eq!(
+            paths,
+            ["common::cluster::Cluster", "common::cluster::form_factor", "common::math", "common::noise::hash", "common::other::f"]
+        );
     }
 
     #[test]

@@ -9,7 +9,9 @@ use crate::files::{Picture, Tone};
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum CompareError {
     /// They differ in size.
-    #[error("the image is {image_width}×{image_height}, the reference {reference_width}×{reference_height}: only pictures of equal size can be compared")]
+    #[error(
+        "the image is {image_width}×{image_height}, the reference {reference_width}×{reference_height}: only pictures of equal size can be compared"
+    )]
     #[allow(missing_docs)]
     Size { image_width: usize, image_height: usize, reference_width: usize, reference_height: usize },
     /// They differ in their channels.

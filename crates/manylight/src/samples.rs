@@ -15,7 +15,6 @@ impl Samples {
         self.0.len()
     }
 
-
     /// Middle value; the mean of the two middle ones when their number is even. `None` without measurements.
     pub fn median(&self) -> Option<f64> {
         let sorted = self.sorted();

@@ -67,7 +67,9 @@ impl Documents {
     pub fn plan(&self, input: &PlanInput) -> Result<Plan, Diagnostics> {
         planner::plan(&self.pipeline, &self.registry, input).map_err(|faults| {
             // That a faulty node cannot be used follows from its own faults: those are told instead.
-            let follows = |fault: &Diagnostic| self.registry.faulty.iter().any(|n| fault.message.starts_with(&format!("the node `{n}` cannot be used")));
+            let follows = |fault: &Diagnostic| {
+                self.registry.faulty.iter().any(|n| fault.message.starts_with(&format!("the node `{n}` cannot be used")))
+            };
             let (secondary, own): (Vec<_>, Vec<_>) = faults.0.into_iter().partition(follows);
             if secondary.is_empty() || !self.registry_faults.has_errors() {
                 return Diagnostics([own, secondary].concat());

@@ -134,7 +134,13 @@ impl Renderer {
     ///
     /// # Errors
     /// Every fault of the pipeline, of the nodes that it uses, of the scene and of the parameters; a plan that the device cannot run.
-    pub fn new(gpu: &Gpu, library: Library, pipeline: impl AsRef<Path>, scene: SceneSource, settings: Settings) -> Result<Self, RenderError> {
+    pub fn new(
+        gpu: &Gpu,
+        library: Library,
+        pipeline: impl AsRef<Path>,
+        scene: SceneSource,
+        settings: Settings,
+    ) -> Result<Self, RenderError> {
         let documents = Documents::load(library, pipeline.as_ref())?;
         let loaded = scene.load()?;
         Self::with(gpu, documents, scene, loaded, settings)
@@ -185,6 +191,11 @@ impl Renderer {
     /// There is no such buffer in the plan.
     pub fn read_json(&self, resource: &str) -> Result<serde_json::Value, ReadError> {
         self.frame.read_json(&self.gpu, &self.scene.externals, resource)
+    }
+
+    /// Measures GPU times by submitting node after node and waiting for each, instead of by timestamps ([`Frame::measure_serially`]).
+    pub fn measure_serially(&mut self, on: bool) {
+        self.frame.measure_serially(on);
     }
 
     /// Times of the newest frame whose timestamps have arrived. Never waits.
@@ -294,7 +305,12 @@ impl Renderer {
     }
 
     /// Plans and builds beside the running frame and swaps when all went well.
-    fn change(&mut self, documents: Option<Documents>, scene: Option<Scene>, settings: Option<Settings>) -> Result<ReloadReport, Diagnostics> {
+    fn change(
+        &mut self,
+        documents: Option<Documents>,
+        scene: Option<Scene>,
+        settings: Option<Settings>,
+    ) -> Result<ReloadReport, Diagnostics> {
         let new_settings = settings.as_ref().unwrap_or(&self.settings);
         let new_documents = documents.as_ref().unwrap_or(&self.documents);
         let mut new_scene = scene.map(|scene| LoadedScene::new(self.scene.source.clone(), scene, new_settings.seed));
@@ -334,7 +350,8 @@ fn build(
     Frame::build(gpu, plan, &scene.externals, hosts, previous, options).map_err(|e| e.diagnostics())
 }
 
-/// Whether two paths name one file, as far as that can be told (a deleted file has no canonical path).
+/// Whether two paths name one file. A deleted file has no canonical path: then its absolute path must do.
 fn same_file(a: &Path, b: &Path) -> bool {
-    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b) || a.ends_with(b) || b.ends_with(a)
+    let place = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or_else(|_| path.to_owned());
+    a == b || place(a) == place(b)
 }

@@ -37,7 +37,11 @@ struct Made {
 
 fn made() -> impl Strategy<Value = Vec<Made>> {
     let input = (any::<prop::sample::Index>(), prop::bool::weighted(0.15));
-    let node = (prop::collection::vec(input, 0..=MOST_INPUTS), 0u8..3, any::<u64>()).prop_map(|(inputs, size, place)| Made { inputs, size, place });
+    let node = (prop::collection::vec(input, 0..=MOST_INPUTS), 0u8..3, any::<u64>()).prop_map(|(inputs, size, place)| Made {
+        inputs,
+        size,
+        place,
+    });
     prop::collection::vec(node, 1..40)
 }
 
@@ -62,7 +66,12 @@ fn pipeline(nodes: &[Made], shown: usize) -> Pipeline {
         let reads = reads(nodes, i);
         write!(text, "(id: \"n{i}\", node: \"t/n{}\", in: {{", reads.len()).unwrap();
         for (port, (resource, previous)) in reads.iter().enumerate() {
-            if *previous { write!(text, "\"in{port}\": Previous(\"r{resource}\"),") } else { write!(text, "\"in{port}\": \"r{resource}\",") }.unwrap();
+            if *previous {
+                write!(text, "\"in{port}\": Previous(\"r{resource}\"),")
+            } else {
+                write!(text, "\"in{port}\": \"r{resource}\",")
+            }
+            .unwrap();
         }
         write!(text, "}}, out: {{\"out\": \"r{i}\"}}),").unwrap();
     }
@@ -112,7 +121,12 @@ fn verify(plan: &Plan) {
             assert_eq!(lives[ix], Some((first, last)), "{}", resource.name);
             for (other_first, other_last, other) in &slots[slot] {
                 assert_eq!(plan.resources[*other].desc, resource.desc);
-                assert!(last < *other_first || *other_last < first, "{} and {} meet in slot {slot}", resource.name, plan.resources[*other].name);
+                assert!(
+                    last < *other_first || *other_last < first,
+                    "{} and {} meet in slot {slot}",
+                    resource.name,
+                    plan.resources[*other].name
+                );
             }
             slots[slot].push((first, last, ix));
         }

@@ -62,7 +62,11 @@ fn faults_of_files() {
     assert_faults(&rendered, 1, &["there is no file `tst.ron`", "variant.ron:1:29", "did you mean `test.ron`?"]);
     let rendered = faults(&variant("Pipeline(doc: \"x\", extends: \"variant.ron\")"), "variant");
     assert_faults(&rendered, 1, &["the file extends itself: pipelines/variant.ron → pipelines/variant.ron", "1:29"]);
-    let files = add(variant("Pipeline(doc: \"x\", extends: \"other.ron\")"), "pipelines/other.ron", "Pipeline(doc: \"x\", extends: \"variant.ron\")");
+    let files = add(
+        variant("Pipeline(doc: \"x\", extends: \"other.ron\")"),
+        "pipelines/other.ron",
+        "Pipeline(doc: \"x\", extends: \"variant.ron\")",
+    );
     let rendered = faults(&files, "variant");
     assert_faults(&rendered, 1, &["itself: pipelines/variant.ron → pipelines/other.ron → pipelines/variant.ron", "other.ron:1:29"]);
     let rendered = faults(&variant("Pipeline(doc: \"x\", extends: \"test.ron\", include: [\"test.ron\"])"), "variant");
@@ -74,6 +78,7 @@ fn faults_of_files() {
     assert_faults(&check_faults(&files), 1, &["there are two nodes `paint`", "test.ron:21:14", "a.ron:1:30"]);
     let files = with(FILE, "nodes: [", "include: [\"stages/none.ron\"], nodes: [");
     assert_faults(&check_faults(&files), 1, &["there is no file `stages/none.ron`", "18:15"]);
-    let files = add(with(FILE, "nodes: [", "include: [\"stages/a.ron\"], nodes: ["), "pipelines/stages/a.ron", "Stage(doc: \"x\", nods: [])");
+    let files =
+        add(with(FILE, "nodes: [", "include: [\"stages/a.ron\"], nodes: ["), "pipelines/stages/a.ron", "Stage(doc: \"x\", nods: [])");
     assert_faults(&check_faults(&files), 1, &["unknown field `nods` in Stage", "a.ron:1:17"]);
 }

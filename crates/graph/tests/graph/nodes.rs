@@ -49,26 +49,94 @@ error: `picture` does not fit its port: the port has the format Rgba32Float, the
 
 #[test]
 fn declarations() {
-    one(RON, "doc: \"Writes a picture and its cells.\"", "dok: \"x\"", &["unknown field `dok` in Node", "paint.ron:2:5", "did you mean `doc`?"]);
+    one(
+        RON,
+        "doc: \"Writes a picture and its cells.\"",
+        "dok: \"x\"",
+        &["unknown field `dok` in Node", "paint.ron:2:5", "did you mean `doc`?"],
+    );
     one(RON, "doc: \"Writes a picture and its cells.\",", "", &["missing field `doc` in Node", "paint.ron:1:1"]);
     one(RON, VIEW, "\"view\": Unifrm(of: \"View\", doc: \"x\")", &["unknown kind of port `Unifrm`", "paint.ron:4:17", "`Uniform`"]);
     one(RON, VIEW, "\"view\": Texture(R32Uint)", &["Texture takes named fields", "paint.ron:4:25", "`format: …`"]);
     one(RON, VIEW, "\"view\": Uniform(of: \"View\")", &["missing field `doc` in Uniform", "paint.ron:4:17"]);
-    one(RON, VIEW, "\"view\": Uniform(of: View, doc: \"x\")", &["in quotes, found the name `View`", "paint.ron:4:29", "write it in quotes: \"View\""]);
-    one(RON, "Texture(format: Rgba16Float", "Texture(format: Rgba16Flaot", &["unknown format `Rgba16Flaot`", "paint.ron:7:36", "`Rgba16Float`"]);
+    one(
+        RON,
+        VIEW,
+        "\"view\": Uniform(of: View, doc: \"x\")",
+        &["in quotes, found the name `View`", "paint.ron:4:29", "write it in quotes: \"View\""],
+    );
+    one(
+        RON,
+        "Texture(format: Rgba16Float",
+        "Texture(format: Rgba16Flaot",
+        &["unknown format `Rgba16Flaot`", "paint.ron:7:36", "`Rgba16Float`"],
+    );
     one(RON, VIEW, "\"cells\": Buffer(of: \"Cell\", doc: \"x\")", &["`cells` is an input and an output", "paint.ron:8:9"]);
     one(RON, "default: 1.0", "default: 3.0", &["the default 3.0 of `strength` is not allowed", "paint.ron:11:56", "from 0.0 to 2.0"]);
     one(RON, "\"sum\", \"mean\"", "\"sum\", \"sum\", \"mean\"", &["the option `sum` is listed twice", "paint.ron:12:41"]);
     one(RON, "Choice(options", "Choise(options", &["unknown parameter type `Choise`", "paint.ron:12:17", "`Choice`"]);
-    one(RON, "over: Texels(\"picture\")", "over: Texels(\"cells\")", &["`cells` is no texture", "paint.ron:16:39", "use `Elements` for buffers"]);
+    one(
+        RON,
+        "over: Texels(\"picture\")",
+        "over: Texels(\"cells\")",
+        &["`cells` is no texture", "paint.ron:16:39", "use `Elements` for buffers"],
+    );
     one(RON, "over: Texels(\"picture\")", "over: Texel(\"picture\")", &["unknown size `Texel`", "paint.ron:16:32", "`Texels`"]);
     one(RON, "over: Texels(\"picture\")", "over: Groups(Param(\"strength\"), 1, 1)", &["`strength` is no Int", "paint.ron:16:45"]);
     one(RON, "over: Texels(\"picture\")", "over: Groups(Param(\"streng\"), 1, 1)", &["no parameter `streng`", "16:45", "`strength`"]);
-    one(RON, "over: Texels(\"picture\")", "over: Texels(\"picture\"), repeat: Down(\"view\")", &["`Down` needs an output texture", "16:64"]);
+    one(
+        RON,
+        "over: Texels(\"picture\")",
+        "over: Texels(\"picture\"), repeat: Down(\"view\")",
+        &["`Down` needs an output texture", "16:64"],
+    );
     one(RON, "over: Texels(\"picture\")", "over: Texels(\"picture\"), repeat: Twice(2)", &["unknown repetition `Twice`", "16:59"]);
     one(RON, "steps: [", "stepps: [", &["unknown field `stepps`", "14:5", "`steps`"]);
-    one("shaders/draw/scene.ron", "depth: \"depth\")", "depth: \"albedo\")", &["`albedo` cannot be a depth attachment", "11:122"]);
+    one("shaders/draw/scene.ron", "depth: \"depth\")", "depth: \"albedo\")", &["`albedo` cannot be a depth attachment", "11:119"]);
     one("shaders/draw/scene.ron", "targets: [\"albedo\"]", "targets: [\"depth\"]", &["`depth` cannot be a colour target", "11:101"]);
+}
+
+#[test]
+fn draws_have_targets_of_known_format_and_no_attributes() {
+    let ron = "shaders/draw/scene.ron";
+    one(ron, "targets: [\"albedo\"]", "targets: [\"albedo\", \"albedo\"]", &["the step draws to `albedo` twice", "11:13"]);
+    one(ron, "targets: [\"albedo\"], depth: \"depth\"", "targets: []", &["the step draws to nothing", "11:13"]);
+    one(
+        ron,
+        "\"albedo\": Texture(format: Rgba16Float,",
+        "\"albedo\": Texture(format: Rgba16Float, optional: true,",
+        &["`albedo` cannot be drawn to", "11:101"],
+    );
+    one(
+        ron,
+        "\"depth\": Texture(format: Depth32Float,",
+        "\"depth\": Texture(",
+        &["an output texture needs a format", "9:18", "`format: …`"],
+    );
+    one(
+        "shaders/draw/scene.wgsl",
+        "index: u32)",
+        "index: u32, @location(0) x: f32)",
+        &["`vs` cannot be used in a node", "scene.wgsl:9:4", "no vertex attributes"],
+    );
+    one(
+        RON,
+        "steps: [",
+        "requires: [\"FLOAT32_FILTERABL\"], steps: [",
+        &["there is no device feature `FLOAT32_FILTERABL`", "14:16", "`FLOAT32_FILTERABLE`"],
+    );
+}
+
+#[test]
+fn filtering_32_bit_floats_needs_a_feature() {
+    let wgsl = "shaders/post/blur.wgsl";
+    let files = with(wgsl, "textureLoad(mask, vec2i(id.xy), 0)", "textureSampleLevel(mask, linear_sampler, vec2f(0.5), 0.0)");
+    let files = edit(files, wgsl, "@compute", "@group(0) @binding(4) var linear_sampler: sampler;\n@compute");
+    assert_faults(&registry_faults(&files), 1, &["it is sampled with a filter", "blur.wgsl:4:27", "FLOAT32_FILTERABLE"]);
+    let allowed = edit(files.clone(), "shaders/post/blur.ron", "steps: [", "requires: [\"FLOAT32_FILTERABLE\"], steps: [");
+    assert_faults(&registry_faults(&allowed), 0, &[]);
+    let nearest: Files = files.into_iter().map(|(name, text)| (name, text.replace("linear_sampler", "nearest_sampler"))).collect();
+    assert_faults(&registry_faults(&nearest), 0, &[]);
 }
 
 #[test]
@@ -83,18 +151,53 @@ fn all_faults_of_a_file_come_at_once_in_order() {
 
 #[test]
 fn ports_and_globals() {
-    one(RON, VIEW, "\"vew\": Uniform(of: \"View\", doc: \"x\")", &["`view` is no port of this node", "paint.wgsl:15:36", "did you mean `vew`?"]);
+    one(
+        RON,
+        VIEW,
+        "\"vew\": Uniform(of: \"View\", doc: \"x\")",
+        &["`view` is no port of this node", "paint.wgsl:15:36", "did you mean `vew`?"],
+    );
     one(RON, &format!("{VIEW},"), "", &["`view` is no port of this node", "paint.wgsl:15:36", "paint.ron:1:1"]);
     one(RON, VIEW, "\"view\": Uniform(of: \"Viewer\", doc: \"x\")", &["the port is of `Viewer`, the shader of `View`"]);
-    one(RON, VIEW, "\"view\": Buffer(of: \"View\", doc: \"x\")", &["the port is a storage buffer", "var<storage, read> view: array<View>;"]);
-    one(RON, VIEW, &format!("{VIEW}, \"more\": Buffer(of: \"u32\", doc: \"x\")"), &["the shader does not use the port `more`", "paint.ron:4:57"]);
-    one(RON, "Buffer(of: \"Cell\"", "Buffer(of: \"Cel\"", &["the port is of `Cel`, the shader of `Cell`", "paint.wgsl:17:48", "paint.ron:8:9"]);
-    one(WGSL, "@group(0) @binding(3)", "@group(0) @binding(4) var s: sampler;\n@group(0) @binding(3)", &["`s` is no port", "paint.wgsl:17:27", "linear_sampler"]);
+    one(
+        RON,
+        VIEW,
+        "\"view\": Buffer(of: \"View\", doc: \"x\")",
+        &["the port is a storage buffer", "var<storage, read> view: array<View>;"],
+    );
+    one(
+        RON,
+        VIEW,
+        &format!("{VIEW}, \"more\": Buffer(of: \"u32\", doc: \"x\")"),
+        &["the shader does not use the port `more`", "paint.ron:4:57"],
+    );
+    one(
+        RON,
+        "Buffer(of: \"Cell\"",
+        "Buffer(of: \"Cel\"",
+        &["the port is of `Cel`, the shader of `Cell`", "paint.wgsl:17:48", "paint.ron:8:9"],
+    );
+    one(
+        WGSL,
+        "@group(0) @binding(3)",
+        "@group(0) @binding(4) var s: sampler;\n@group(0) @binding(3)",
+        &["`s` is no port", "paint.wgsl:17:27", "linear_sampler"],
+    );
     one(WGSL, "@group(0) @binding(3)", "@group(4) @binding(3)", &["`cells` is in group 4", "paint.wgsl:17:48"]);
     let pyramid = "shaders/post/pyramid.wgsl";
-    one(pyramid, "var<storage, read> cells", "var<storage, read_write> cells", &["`cells` does not fit its port: an input is not written", "3:48"]);
+    one(
+        pyramid,
+        "var<storage, read> cells",
+        "var<storage, read_write> cells",
+        &["`cells` does not fit its port: an input is not written", "3:48"],
+    );
     let ron = "shaders/post/pyramid.ron";
-    one(ron, ", repeat: Up(\"pyramid\")", "", &["`pyramid_coarser` exists only in a step with `repeat: Up(\"pyramid\")`", "pyramid.wgsl:6:27"]);
+    one(
+        ron,
+        ", repeat: Up(\"pyramid\")",
+        "",
+        &["`pyramid_coarser` exists only in a step with `repeat: Up(\"pyramid\")`", "pyramid.wgsl:6:27"],
+    );
     let files = with("shaders/post/blur.wgsl", "var mask: texture_2d<f32>", "var mask: texture_2d<u32>");
     let files = edit(files, "shaders/post/blur.wgsl", "textureLoad(mask, vec2i(id.xy), 0)", "vec4f(textureLoad(mask, vec2i(id.xy), 0))");
     assert_faults(&registry_faults(&files), 1, &["R32Float does not read as unsigned integers", "blur.wgsl:4:27", "texture_2d<f32>"]);
@@ -103,15 +206,33 @@ fn ports_and_globals() {
 #[test]
 fn outputs_must_be_written_and_ports_used_by_a_step() {
     let rendered = registry_faults(&with(RON, "(entry: \"clear\", over: Elements(\"cells\")),", ""));
-    assert_faults(&rendered, 2, &["error: no step writes the output `cells`", "paint.ron:8:9", "warning: no step runs the entry point `clear`", "paint.wgsl:20:4"]);
+    assert_faults(
+        &rendered,
+        2,
+        &["error: no step writes the output `cells`", "paint.ron:8:9", "warning: no step runs the entry point `clear`", "paint.wgsl:20:4"],
+    );
     let rendered = registry_faults(&with(RON, "(entry: \"paint\", over: Texels(\"picture\")),", ""));
-    assert_faults(&rendered, 3, &["no step uses the port `view`", "no step uses the port `picture`", "no step runs the entry point `paint`"]);
+    assert_faults(
+        &rendered,
+        3,
+        &["no step uses the port `view`", "no step uses the port `picture`", "no step runs the entry point `paint`"],
+    );
 }
 
 #[test]
 fn parameters() {
-    one(RON, "\"strength\": Float", "\"strenght\": Float", &["`strength` is no parameter of this node", "paint.wgsl:4:5", "did you mean `strenght`?"]);
-    one(RON, "Float(min: 0.0, max: 2.0, default: 1.0", "Int(min: 0, max: 2, default: 1", &["wrong type for a parameter of type Int", "4:5", "i32 or u32"]);
+    one(
+        RON,
+        "\"strength\": Float",
+        "\"strenght\": Float",
+        &["`strength` is no parameter of this node", "paint.wgsl:4:5", "did you mean `strenght`?"],
+    );
+    one(
+        RON,
+        "Float(min: 0.0, max: 2.0, default: 1.0",
+        "Int(min: 0, max: 2, default: 1",
+        &["wrong type for a parameter of type Int", "4:5", "i32 or u32"],
+    );
     one(RON, "\"sum\", \"mean\"", "\"sum\", \"min\"", &["an option `mean` that does not exist", "paint.wgsl:12:10", "did you mean `min`?"]);
     one(RON, "\"mode\":", "\"idle\": Bool(default: true, doc: \"x\"), \"mode\":", &["nothing uses the parameter `idle`", "paint.ron:12:9"]);
     one(RON, "\"mode\": Choice", "\"mod\": Choice", &["the override `mode_is_mean` is no parameter", "paint.wgsl:12:10"]);
@@ -125,10 +246,28 @@ fn parameters() {
 fn entry_points() {
     one(RON, "entry: \"paint\"", "entry: \"pant\"", &["no compute entry point `pant`", "paint.ron:16:17", "did you mean `paint`?"]);
     one(RON, "over: Texels(\"picture\")", "over: Elements(\"cells\")", &["`paint` runs over elements, in one dimension", "16:32", "8×8×1"]);
-    one("shaders/draw/scene.ron", "fragment: \"fs\"", "fragment: \"vs\"", &["`vs` is a vertex entry point, and this step needs a fragment one", "11:42"]);
-    one("shaders/draw/scene.ron", "targets: [\"albedo\"]", "targets: []", &["has 0 targets, and `fs` writes 1 locations", "scene.wgsl:14:4"]);
-    let uint = with("shaders/draw/scene.wgsl", "-> @location(0) vec4f {\n    return vec4f(1.0);", "-> @location(0) vec4u {\n    return vec4u(1u);");
-    assert_faults(&registry_faults(&uint), 1, &["location 0 of `fs` writes unsigned integers, and `albedo` has the format Rgba16Float", "scene.wgsl:14:4"]);
+    one(
+        "shaders/draw/scene.ron",
+        "fragment: \"fs\"",
+        "fragment: \"vs\"",
+        &["`vs` is a vertex entry point, and this step needs a fragment one", "11:42"],
+    );
+    one(
+        "shaders/draw/scene.ron",
+        "targets: [\"albedo\"]",
+        "targets: []",
+        &["has 0 targets, and `fs` writes 1 locations", "scene.wgsl:14:4"],
+    );
+    let uint = with(
+        "shaders/draw/scene.wgsl",
+        "-> @location(0) vec4f {\n    return vec4f(1.0);",
+        "-> @location(0) vec4u {\n    return vec4u(1u);",
+    );
+    assert_faults(
+        &registry_faults(&uint),
+        1,
+        &["location 0 of `fs` writes unsigned integers, and `albedo` has the format Rgba16Float", "scene.wgsl:14:4"],
+    );
 }
 
 #[test]
@@ -148,7 +287,11 @@ fn faults_of_imported_files_point_there_and_are_told_once() {
     // Two shaders import it.
     one(COMMON, "f32(cell.count)", "f32(cell.cout)", &["invalid field accessor `cout`", "shaders/common/cell.wgsl:7:21"]);
     let digits = edit(with(COMMON, "count: u32", "count2: u32"), COMMON, "cell.count", "cell.count2");
-    assert_faults(&registry_faults(&digits), 1, &["the name `count2` cannot be shared between files", "shaders/common/cell.wgsl:1", "must not end in a digit"]);
+    assert_faults(
+        &registry_faults(&digits),
+        1,
+        &["the name `count2` cannot be shared between files", "shaders/common/cell.wgsl:1", "must not end in a digit"],
+    );
     one(COMMON, "fn area", "@compute fn area", &["shaders/common has no entry points", "cell.wgsl:6:1"]);
     one(COMMON, "fn area", "@group(0) fn area", &["shaders/common has no bindings", "cell.wgsl:6:1"]);
     one(COMMON, "fn area", "override k: u32;\nfn area", &["no overrides, and `k` is one", "cell.wgsl:6:10"]);
@@ -157,18 +300,39 @@ fn faults_of_imported_files_point_there_and_are_told_once() {
 
 #[test]
 fn imports() {
-    one(WGSL, "common::cell::{", "common::cel::{", &["there is no module `common::cel`", "paint.wgsl:1:23", "did you mean `common::cell`?"]);
+    one(
+        WGSL,
+        "common::cell::{",
+        "common::cel::{",
+        &["there is no module `common::cel`", "paint.wgsl:1:23", "did you mean `common::cell`?"],
+    );
     one(WGSL, "{Cell, area}", "{Cell, aera}", &["`common::cell` has no item `aera`", "paint.wgsl:1:30", "did you mean `area`?"]);
     one(WGSL, "{Cell, area}", "{Cell, area", &["the import's `{` is never closed", "paint.wgsl:1:23"]);
-    let files = add(with(COMMON, "struct Cell", "#import common::other::f\nstruct Cell"), "shaders/common/other.wgsl", "#import common::cell\nfn f() {}\n");
+    let files = add(
+        with(COMMON, "struct Cell", "#import common::other::f\nstruct Cell"),
+        "shaders/common/other.wgsl",
+        "#import common::cell\nfn f() {}\n",
+    );
     let rendered = registry_faults(&files);
-    assert_faults(&rendered, 1, &["modules import each other in a circle: common::cell → common::other → common::cell", "cell.wgsl:1:9", "other.wgsl:1:9"]);
+    assert_faults(
+        &rendered,
+        1,
+        &["modules import each other in a circle: common::cell → common::other → common::cell", "cell.wgsl:1:9", "other.wgsl:1:9"],
+    );
 }
 
 #[test]
 fn modules_of_common_import_each_other_in_any_order_of_names() {
-    let files = add(with(COMMON, "f32(cell.count)", "zoom::twice(f32(cell.count))"), "shaders/common/zoom.wgsl", "#import common::aid::one\nfn twice(x: f32) -> f32 { return x * 2.0 * one(); }\n");
-    let files = add(edit(files, COMMON, "struct Cell", "#import common::zoom\nstruct Cell"), "shaders/common/aid.wgsl", "fn one() -> f32 { return 1.0; }\n");
+    let files = add(
+        with(COMMON, "f32(cell.count)", "zoom::twice(f32(cell.count))"),
+        "shaders/common/zoom.wgsl",
+        "#import common::aid::one\nfn twice(x: f32) -> f32 { return x * 2.0 * one(); }\n",
+    );
+    let files = add(
+        edit(files, COMMON, "struct Cell", "#import common::zoom\nstruct Cell"),
+        "shaders/common/aid.wgsl",
+        "fn one() -> f32 { return 1.0; }\n",
+    );
     let (registry, faults) = registry(&files, &[]);
     assert!(faults.is_empty(), "{faults}");
     let shader = registry.nodes["draw/paint"].shader.as_ref().unwrap();
@@ -190,5 +354,9 @@ fn partners() {
 #[test]
 fn a_structure_has_one_layout() {
     let files = with("shaders/draw/scene.wgsl", "origin: vec3f,\n    far: f32,", "origin: vec3f,\n    near: f32,");
-    assert_faults(&registry_faults(&files), 1, &["`View` differs from that of the node `draw/paint`: member 1 is `near` instead of `far`", "scene.wgsl:1:8", "paint.wgsl:7:8"]);
+    assert_faults(
+        &registry_faults(&files),
+        1,
+        &["`View` differs from that of the node `draw/paint`: member 1 is `near` instead of `far`", "scene.wgsl:1:8", "paint.wgsl:7:8"],
+    );
 }

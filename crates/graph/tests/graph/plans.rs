@@ -41,15 +41,23 @@ fn values_come_from_defaults_presets_and_the_user() {
 
 #[test]
 fn wrong_values_of_the_user_name_range_and_options() {
-    let faults = try_plan(&files(), &set(&[("cont", "1"), ("count", "0"), ("kind", "plan"), ("blur", "maybe"), ("paint.strenth", "1"), ("radius", "1.5")])).unwrap_err();
-    assert_faults(&faults.render(), 6, &[
-        "the pipeline `test` has no parameter `cont`\n = help: did you mean `count`?",
-        "`0` is no value of `count`\n = help: it takes a whole number from 1 to 4096",
-        "`plan` is no value of `kind`\n = help: it takes one of `plain`, `masked`; did you mean `plain`?",
-        "`maybe` is no value of `blur`\n = help: it takes true or false",
-        "the node `paint` (draw/paint) has no parameter `strenth`\n = help: did you mean `strength`?",
-        "`1.5` is no value of `radius`",
-    ]);
+    let faults = try_plan(
+        &files(),
+        &set(&[("cont", "1"), ("count", "0"), ("kind", "plan"), ("blur", "maybe"), ("paint.strenth", "1"), ("radius", "1.5")]),
+    )
+    .unwrap_err();
+    assert_faults(
+        &faults.render(),
+        6,
+        &[
+            "the pipeline `test` has no parameter `cont`\n = help: did you mean `count`?",
+            "`0` is no value of `count`\n = help: it takes a whole number from 1 to 4096",
+            "`plan` is no value of `kind`\n = help: it takes one of `plain`, `masked`; did you mean `plain`?",
+            "`maybe` is no value of `blur`\n = help: it takes true or false",
+            "the node `paint` (draw/paint) has no parameter `strenth`\n = help: did you mean `strength`?",
+            "`1.5` is no value of `radius`",
+        ],
+    );
 }
 
 #[test]
@@ -57,7 +65,8 @@ fn draws_have_targets_and_vertices() {
     let plan = try_plan(&files(), &set(&[("blur", "false")])).unwrap();
     assert_eq!(ids(&plan), ["scene", "hard", "show"]);
     let albedo = plan.resource("albedo").unwrap();
-    let step = PlanStep::Draw { vertex: "vs".into(), fragment: "fs".into(), vertices: 36, targets: vec![albedo], depth: plan.resource("depth") };
+    let step =
+        PlanStep::Draw { vertex: "vs".into(), fragment: "fs".into(), vertices: 36, targets: vec![albedo], depth: plan.resource("depth") };
     assert_eq!(plan.nodes[0].steps, [step]);
     assert!(plan.resources[albedo].usage.target && plan.resources[albedo].usage.read && !plan.resources[albedo].usage.storage);
     let reasons: Vec<_> = plan.idle.iter().map(|n| (n.id.as_str(), n.reason.clone())).collect();
@@ -81,7 +90,12 @@ fn transients_share_memory_when_their_lives_do_not_touch() {
     // picture → blurred → result have equal descriptions; picture and result do not meet.
     let files = with(FILE, "presents: \"result\"", "presents: \"last\"");
     let files = edit(files, FILE, "\"result\": Texture", "\"last\": Texture(format: Rgba16Float, size: Output), \"result\": Texture");
-    let files = edit(files, FILE, "nodes: [", "nodes: [(id: \"end\", node: \"post/blur\", in: {\"source\": \"result\"}, out: {\"blurred\": \"last\"}),");
+    let files = edit(
+        files,
+        FILE,
+        "nodes: [",
+        "nodes: [(id: \"end\", node: \"post/blur\", in: {\"source\": \"result\"}, out: {\"blurred\": \"last\"}),",
+    );
     let plan = try_plan(&files, &input()).unwrap();
     let slot = |plan: &Plan, name: &str| match plan.resources[plan.resource(name).unwrap()].lifetime {
         Lifetime::Transient { slot, .. } => slot,
@@ -112,7 +126,8 @@ fn history_lives_on() {
 
 #[test]
 fn an_optional_input_whose_producer_is_off_is_absent() {
-    let files = with(FILE, "(id: \"pyramid\", node: \"post/pyramid\")", "(id: \"pyramid\", node: \"post/pyramid\", when: AtLeast(\"count\", 200))");
+    let files =
+        with(FILE, "(id: \"pyramid\", node: \"post/pyramid\")", "(id: \"pyramid\", node: \"post/pyramid\", when: AtLeast(\"count\", 200))");
     let plan = try_plan(&files, &input()).unwrap();
     assert_eq!(plan.nodes.iter().find(|n| n.id == "soft").unwrap().bindings[1], ("mask".into(), Target::Absent));
     assert_eq!(plan.idle[1].reason, Idle::Off("`count` is 100, below 200".into()));
@@ -129,13 +144,47 @@ fn many_elements_fold_into_rows() {
 fn sizes_beyond_the_limits_name_the_resource_and_the_remedy() {
     let files = with(FILE, "\"count\": Int(min: 1, max: 4096", "\"count\": Int(min: 1, max: 1000000000");
     let faults = try_plan(&files, &set(&[("count", "90000000")])).unwrap_err();
-    assert_faults(&faults.render(), 1, &["the buffer `cells` is too large: 180000000 elements", "test.ron:13:44", "lower the parameter `count` (now 90000000)"]);
+    assert_faults(
+        &faults.render(),
+        1,
+        &["the buffer `cells` is too large: 180000000 elements", "test.ron:13:44", "lower the parameter `count` (now 90000000)"],
+    );
     let faults = try_plan(&crate::kit::files(), &PlanInput { output: (0, 4), ..input() }).unwrap_err();
     assert_faults(&faults.render(), 1, &["a picture of 0×4 pixels cannot be rendered", "sides are 1 to 16384"]);
     let faults = try_plan(&crate::kit::files(), &PlanInput { output: (20000, 4), ..input() }).unwrap_err();
     assert_faults(&faults.render(), 1, &["a picture of 20000×4 pixels"]);
     let plan = try_plan(&crate::kit::files(), &PlanInput { output: (1, 1), ..input() }).unwrap();
     assert_eq!(plan.nodes[1].steps.len(), 1, "a pyramid of one texel has one level");
+}
+
+#[test]
+fn targets_of_a_draw_have_one_size() {
+    let files = with(
+        FILE,
+        "\"depth\": Texture(format: Depth32Float, size: Like(\"albedo\"))",
+        "\"depth\": Texture(format: Depth32Float, size: OutputScaled(1, 2))",
+    );
+    let faults = try_plan(&files, &set(&[("blur", "false")])).unwrap_err();
+    assert_faults(
+        &faults.render(),
+        1,
+        &["a step of node `scene` draws to `albedo` with 640×360 and to `depth` with 320×180 texels", "scene.ron:11:13"],
+    );
+}
+
+#[test]
+fn long_chains_of_sizes_are_faults() {
+    let mut text = String::from("\"r0\": Texture(format: Rgba16Float, size: Output)");
+    for i in 1..20_000 {
+        text += &format!(", \"r{i}\": Texture(format: Rgba16Float, size: Like(\"r{}\"))", i - 1);
+    }
+    let files = with(
+        FILE,
+        "\"result\": Texture(format: Rgba16Float, size: Like(\"blurred\"))",
+        &format!("{text}, \"result\": Texture(format: Rgba16Float, size: Like(\"r19999\"))"),
+    );
+    let faults = try_plan(&files, &input()).unwrap_err();
+    assert_faults(&faults.render(), 1, &["sizes refer to each other through more than 256 resources"]);
 }
 
 #[test]
@@ -156,7 +205,11 @@ fn host_nodes_are_like_others() {
     let host = [HostDecl { name: "host/points", ron }];
     let (registry, faults) = registry(&files(), &host);
     assert!(faults.is_empty(), "{faults}");
-    let files = with(FILE, "(id: \"paint\", node: \"draw/paint\", in: {\"view\": \"scene_camera\"}, params: {\"strength\": 0.5})", "(id: \"points\", node: \"host/points\")");
+    let files = with(
+        FILE,
+        "(id: \"paint\", node: \"draw/paint\", in: {\"view\": \"scene_camera\"}, params: {\"strength\": 0.5})",
+        "(id: \"points\", node: \"host/points\")",
+    );
     let files = edit(files, FILE, "{\"source\": \"picture\", \"mask\": \"pyramid\"}", "{\"source\": \"albedo\", \"mask\": \"pyramid\"}");
     let pipeline = manylight_graph::pipeline::Pipeline::load(&library(&files), "test").unwrap();
     let plan = manylight_graph::planner::plan(&pipeline, &registry, &input()).unwrap();
@@ -184,8 +237,21 @@ fn a_faulty_node_is_not_also_unknown() {
 #[test]
 fn externals_have_the_layout_that_rust_fills() {
     let mut externals = externals();
-    externals.push(External { name: "other_camera".into(), kind: PortKind::Uniform { of: "View".into() }, doc: String::new(), layout: None });
+    externals.push(External {
+        name: "other_camera".into(),
+        kind: PortKind::Uniform { of: "View".into() },
+        doc: String::new(),
+        layout: None,
+    });
     externals[0].layout = Some(manylight_graph::shader::Layout { size: 32, members: Vec::new() });
     let (_, faults) = manylight_graph::registry::Registry::load(&library(&files()), &[], externals);
-    assert_faults(&faults.render(), 2, &["`View` differs from that of the external `scene_camera`: it has the member `origin` in addition", "paint.wgsl:7:8", "scene.wgsl:1:8"]);
+    assert_faults(
+        &faults.render(),
+        2,
+        &[
+            "`View` differs from that of the external `scene_camera`: it has the member `origin` in addition",
+            "paint.wgsl:7:8",
+            "scene.wgsl:1:8",
+        ],
+    );
 }

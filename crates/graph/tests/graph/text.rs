@@ -21,12 +21,20 @@ fn text(text: &str, parts: &[&str]) {
 
 #[test]
 fn syntax() {
-    one("doc: \"A pipeline that is right.\",", "doc: \"A pipeline that is right.\"", &["expected a comma or the closing `)`", "test.ron:3:5"]);
+    one(
+        "doc: \"A pipeline that is right.\",",
+        "doc: \"A pipeline that is right.\"",
+        &["expected a comma or the closing `)`", "test.ron:3:5"],
+    );
     one("size: Like(\"albedo\"))", "size: Like(\"albedo\")", &["`(` is closed by `}`", "17:5", "opened here"]);
     one("presents: \"result\",\n)", "", &["`(` is never closed", "1:9", "add the missing `)`"]);
     one("presents: \"result\",\n)", "presents: \"result\",\n))", &["`)` closes nothing", "27:2"]);
     one("presents: \"result\",\n)", "presents: \"result,\n)", &["the string is never closed", "26:15"]);
-    one("presents: \"result\"", "presents: result", &["expected the name of a resource in quotes, found the name `result`", "26:15", "write it in quotes"]);
+    one(
+        "presents: \"result\"",
+        "presents: result",
+        &["expected the name of a resource in quotes, found the name `result`", "26:15", "write it in quotes"],
+    );
     one("\"blur\": Bool", "\"blur\" Bool", &["expected `:` after the key", "4:16"]);
 }
 
@@ -41,7 +49,11 @@ fn odd_files() {
     text(&"Not(".repeat(100_000), &["brackets are nested more than 96 deep"]);
     text(&format!("{}\u{0}\u{1}", "x".repeat(100_000)), &["error"]);
     let nested = format!("when: {}IsOn(\"blur\"){}", "Not(".repeat(80), ")".repeat(80));
-    assert_faults(&check_faults(&with(FILE, "when: Not(IsOn(\"blur\"))", &nested)), 2, &["written by two nodes", "not written in this frame"]);
+    assert_faults(
+        &check_faults(&with(FILE, "when: Not(IsOn(\"blur\"))", &nested)),
+        2,
+        &["written by two nodes", "not written in this frame"],
+    );
 }
 
 #[test]
@@ -118,5 +130,29 @@ proptest! {
         files.retain(|(n, _)| n.contains("draw/paint") || n.contains("common"));
         let (_, faults) = registry(&files, &[]);
         let _ = (faults.render(), faults.to_json());
+    }
+}
+
+#[test]
+fn deeply_nested_shaders_are_faults() {
+    let deep = |open: &str, close: &str, count: usize| format!("fn f() {{ var x = {}1{}; }}\n", open.repeat(count), close.repeat(count));
+    let blocks = format!("fn f() {}{}\n", "{".repeat(20_000), "}".repeat(20_000));
+    let elses = format!("fn f() {{ {} {{}} }}\n", "if true {} else ".repeat(5_000));
+    let types = format!("alias A = {}u32{};\n", "array<".repeat(5_000), ", 1>".repeat(5_000));
+    let chain = format!("fn f() {{ var x = 1{}; }}\n", " + 1".repeat(20_000));
+    for text in [deep("(", ")", 20_000), deep("-", "", 20_000), deep("abs(", ")", 5_000), blocks, elses, types, chain] {
+        let (_, faults) = registry(&vec![("shaders/common/deep.wgsl".to_owned(), text)], &[]);
+        assert_faults(&faults.render(), 1, &["are nested too deeply", "deep.wgsl:1:"]);
+    }
+    // What is allowed does not overflow either.
+    let legal = [
+        deep("(", ")", 100),
+        deep("- ", "", 100),
+        deep("abs(", ")", 100),
+        format!("fn f() {{ {} {{}} }}\n", "if true {} else ".repeat(100)),
+    ];
+    for text in legal.into_iter().chain([format!("fn f() {{ var x = 1{}; }}\n", " + 1".repeat(3_900))]) {
+        let (_, faults) = registry(&vec![("shaders/common/deep.wgsl".to_owned(), text)], &[]);
+        assert_faults(&faults.render(), 0, &[]);
     }
 }

@@ -248,7 +248,9 @@ pub struct ProfileArgs {
 
 /// `manylight watch`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  manylight watch acrsm --scene cornell --out picture.png\nEdit a file under shaders/ or pipelines/ and save it. Ctrl+C ends.")]
+#[command(
+    after_help = "Example:\n  manylight watch acrsm --scene cornell --out picture.png\nEdit a file under shaders/ or pipelines/ and save it. Ctrl+C ends."
+)]
 pub struct WatchArgs {
     #[command(flatten)]
     #[allow(missing_docs)]

@@ -160,7 +160,9 @@ impl Checker {
         let inside = loaded.library.root().and_then(|root| root.canonicalize().ok()).map(|root| root.join("shaders"));
         if !own.as_ref().zip(inside).is_some_and(|(file, shaders)| file.starts_with(shaders)) {
             let fault = Diagnostic::error_nowhere(format!("the node `{}` lies in no library", path.display()));
-            return self.found.push(fault.help("nodes are `shaders/STAGE/NAME.ron` beside `NAME.wgsl`, under a folder that has `pipelines/` as well"));
+            return self
+                .found
+                .push(fault.help("nodes are `shaders/STAGE/NAME.ron` beside `NAME.wgsl`, under a folder that has `pipelines/` as well"));
         }
         let about = |d: &Diagnostic| {
             d.labels.iter().any(|l| l.span.source.path.as_deref().and_then(stem) == own)
@@ -187,7 +189,8 @@ impl Checker {
                     (includes, check(&pipeline, &loaded.registry))
                 }
                 Err(found) => {
-                    let names = |d: &Diagnostic| d.labels.iter().any(|l| l.span.source.path.as_deref().and_then(|p| p.canonicalize().ok()) == own);
+                    let names =
+                        |d: &Diagnostic| d.labels.iter().any(|l| l.span.source.path.as_deref().and_then(|p| p.canonicalize().ok()) == own);
                     (found.0.iter().any(names), found)
                 }
             };

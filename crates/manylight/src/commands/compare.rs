@@ -46,7 +46,8 @@ fn read_layer(path: &Path, layer: Option<&str>) -> Result<(Picture, Vec<String>)
 }
 
 fn text(metrics: &Metrics) -> String {
-    let ratio = |value: Option<f64>| value.map_or("undefined (the mean of the reference is 0)".to_owned(), |v| format!("{:.3} %", v * 100.0));
+    let ratio =
+        |value: Option<f64>| value.map_or("undefined (the mean of the reference is 0)".to_owned(), |v| format!("{:.3} %", v * 100.0));
     let energy = metrics.energy_ratio().map_or("undefined (the mean of the reference is 0)".to_owned(), |v| format!("{v:.5}"));
     let mut lines = vec![
         ("pixels", format!("{} × {} ({})", metrics.width, metrics.height, metrics.channels.join(", "))),
@@ -62,10 +63,16 @@ fn text(metrics: &Metrics) -> String {
         ("99.9th percentile", format!("{:.6}", metrics.percentile_999)),
     ];
     let excluded = metrics.non_finite_image + metrics.non_finite_reference;
-    lines.push(("not finite", if excluded == 0 {
-        "none".to_owned()
-    } else {
-        format!("{excluded} pixels left out ({} of the image, {} of the reference)", metrics.non_finite_image, metrics.non_finite_reference)
-    }));
+    lines.push((
+        "not finite",
+        if excluded == 0 {
+            "none".to_owned()
+        } else {
+            format!(
+                "{excluded} pixels left out ({} of the image, {} of the reference)",
+                metrics.non_finite_image, metrics.non_finite_reference
+            )
+        },
+    ));
     lines.iter().map(|(name, value)| format!("{name:<24}{value}\n")).collect()
 }

@@ -30,10 +30,8 @@ pub fn run(cli: &Cli, args: &ExplainArgs) -> Result<(), Fault> {
     match args.format {
         TextOrJson::Text => super::print(&text(&lines)),
         TextOrJson::Json => {
-            let nodes: Vec<_> = lines
-                .iter()
-                .map(|l| json!({"id": l.id, "state": l.state, "reason": l.reason, "node": l.node, "stage": l.stage}))
-                .collect();
+            let nodes: Vec<_> =
+                lines.iter().map(|l| json!({"id": l.id, "state": l.state, "reason": l.reason, "node": l.node, "stage": l.stage})).collect();
             super::print(&format!("{:#}\n", json!({"pipeline": session.pipeline().name, "nodes": nodes})))
         }
     }
@@ -90,7 +88,11 @@ fn uses(plan: &Plan, resource: usize) -> Vec<String> {
     let readers = |wanted: Target| -> Vec<String> {
         plan.nodes
             .iter()
-            .filter(|n| n.bindings.iter().any(|(port, target)| *target == wanted && n.decl.ports.get(port).is_some_and(|p| p.direction == Direction::Input)))
+            .filter(|n| {
+                n.bindings
+                    .iter()
+                    .any(|(port, target)| *target == wanted && n.decl.ports.get(port).is_some_and(|p| p.direction == Direction::Input))
+            })
             .map(|n| n.id.clone())
             .collect()
     };

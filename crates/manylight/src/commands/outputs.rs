@@ -7,9 +7,9 @@ use manylight::{
     files::{FileKind, Picture, write_exr, write_png, write_text},
     gpu::Image,
     graph::{
+        nearest,
         plan::Plan,
         registry::Registry,
-        nearest,
         value::{Encoding, Format, ResourceDesc},
     },
     renderer::Renderer,
@@ -72,7 +72,8 @@ impl Outputs {
                 (_, desc) => matches!(desc, ResourceDesc::Texture { .. }),
             };
             if !fits {
-                let help = if matches!(desc, ResourceDesc::Texture { .. }) { "a texture: write .exr or .png" } else { "a buffer: write .json" };
+                let help =
+                    if matches!(desc, ResourceDesc::Texture { .. }) { "a texture: write .exr or .png" } else { "a buffer: write .json" };
                 return Err(Fault::Usage(format!("`{name}` cannot be written to `{}`, it is {help}", file.display())));
             }
         }
@@ -121,7 +122,11 @@ fn write_dump(renderer: &Renderer, name: &str, file: &Path) -> Result<(), Fault>
     let is_texture = matches!(desc, ResourceDesc::Texture { .. });
     match FileKind::of(file).map_err(of_file)? {
         FileKind::Json => {
-            let value = if is_texture { texels(&read(renderer, name)?) } else { renderer.read_json(name).map_err(|e| Fault::Input(e.to_string()))? };
+            let value = if is_texture {
+                texels(&read(renderer, name)?)
+            } else {
+                renderer.read_json(name).map_err(|e| Fault::Input(e.to_string()))?
+            };
             write_text(file, &format!("{value:#}\n")).map_err(of_file)
         }
         FileKind::Exr => write_exr(file, &picture(read(renderer, name)?)).map_err(of_file),

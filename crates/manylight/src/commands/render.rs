@@ -86,7 +86,7 @@ fn stats(renderer: &Renderer, args: &RenderArgs, samples: &FrameSamples) -> Resu
         "parameters": stats::parameters(plan),
         "timings": stats::timings(samples),
         "memory": stats::memory(renderer),
-        "plan": stats::plan(plan),
+        "plan": plan.to_json(),
         "sums": stats::sums(renderer, &names)?,
     }))
 }

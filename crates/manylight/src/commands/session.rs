@@ -98,7 +98,8 @@ pub fn of_render(error: RenderError) -> Fault {
 fn warn_of_lights(scene: &Scene, plan: &Plan) {
     let dark = scene.lights.len().saturating_sub(1);
     if dark > 0 && plan.resource("scene_light").is_some() {
-        let message = format!("the scene has {} lights; this pipeline renders the first: {dark} are not rendered", scene.lights.len());
+        let message =
+            format!("the scene has {} lights, but this pipeline renders only the first; not rendered: {dark}", scene.lights.len());
         super::warn(&Diagnostics(vec![Diagnostic { severity: Severity::Warning, ..Diagnostic::error_nowhere(message) }]));
     }
 }

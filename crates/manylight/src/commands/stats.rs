@@ -4,7 +4,7 @@ use manylight::{
     fault::Fault,
     gpu::{FrameTimings, Gpu, Image, memory::Holding},
     graph::{
-        plan::{Idle, Plan},
+        plan::Plan,
         value::{ResourceDesc, Value as Parameter},
     },
     renderer::Renderer,
@@ -120,29 +120,6 @@ pub fn memory(renderer: &Renderer) -> Value {
     })
 }
 
-pub fn plan(plan: &Plan) -> Value {
-    let nodes: Vec<Value> = plan.nodes.iter().map(|n| json!({"id": n.id, "node": n.decl.name, "stage": n.stage})).collect();
-    let idle: Vec<Value> = plan
-        .idle
-        .iter()
-        .map(|n| {
-            let (state, reason) = match &n.reason {
-                Idle::Off(clause) => ("off", Value::from(clause.as_str())),
-                Idle::Dead => ("dead", Value::Null),
-            };
-            json!({"id": n.id, "node": n.kind, "stage": n.stage, "state": state, "reason": reason})
-        })
-        .collect();
-    let name = |index: usize| plan.resources[index].name.as_str();
-    json!({
-        "nodes": nodes,
-        "idle": idle,
-        "presents": name(plan.presents),
-        "radiance": plan.radiance.map(name),
-        "slots": plan.slots,
-    })
-}
-
 pub fn parameters(plan: &Plan) -> Value {
     let value = |value: &Parameter| match value {
         Parameter::Int(v) => json!(v),
@@ -189,7 +166,7 @@ fn sums_of_image(image: &Image) -> Value {
 /// The element-wise sum of all elements; arrays and objects are summed member by member.
 fn sums_of_elements(elements: &Value) -> Value {
     let Value::Array(elements) = elements else { return elements.clone() };
-    let sum = elements.iter().fold(Value::Null, |sum, element| add(sum, element));
+    let sum = elements.iter().fold(Value::Null, add);
     json!({"elements": elements.len(), "sum": sum})
 }
 

@@ -47,16 +47,9 @@ pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), FileError> {
             AnyChannel::new(name.as_str(), FlatSamples::F32(plane))
         })
         .collect();
-    let layer = Layer::new(
-        (picture.width, picture.height),
-        LayerAttributes::default(),
-        Encoding::SMALL_LOSSLESS,
-        AnyChannels::sort(list),
-    );
+    let layer = Layer::new((picture.width, picture.height), LayerAttributes::default(), Encoding::SMALL_LOSSLESS, AnyChannels::sort(list));
     let image = Image::from_layer(layer);
-    write_whole(path, |w| {
-        image.write().to_buffered(w).map_err(|e| FileError::write(path, &std::io::Error::other(e.to_string())))
-    })
+    write_whole(path, |w| image.write().to_buffered(w).map_err(|e| FileError::write(path, &std::io::Error::other(e.to_string()))))
 }
 
 #[cfg(test)]

@@ -72,21 +72,14 @@ impl Picture {
     /// The same without alpha.
     #[must_use]
     pub fn without_alpha(&self) -> Self {
-        let kept: Vec<(usize, String)> =
-            self.names.iter().enumerate().filter(|(_, n)| *n != "A").map(|(i, n)| (i, n.clone())).collect();
+        let kept: Vec<(usize, String)> = self.names.iter().enumerate().filter(|(_, n)| *n != "A").map(|(i, n)| (i, n.clone())).collect();
         if kept.is_empty() || kept.len() == self.names.len() { self.clone() } else { self.pick(&kept) }
     }
 
     fn pick(&self, channels: &[(usize, String)]) -> Self {
         let all = self.names.len();
         let data = self.data.chunks_exact(all).flat_map(|pixel| channels.iter().map(|(i, _)| pixel[*i])).collect();
-        Self {
-            width: self.width,
-            height: self.height,
-            names: channels.iter().map(|(_, n)| n.clone()).collect(),
-            data,
-            tone: self.tone,
-        }
+        Self { width: self.width, height: self.height, names: channels.iter().map(|(_, n)| n.clone()).collect(), data, tone: self.tone }
     }
 }
 
