@@ -1,7 +1,8 @@
 // Evaluation of last frame's clusters. [ACRSM] 4.8 and 5.3.1; runs first in the frame, as the paper does.
 // Differs from the paper: eq. 4.6 with A_max = 0 and eq. 4.7 with Σδ = 0 or without a neighbour mean "do nothing"; the neighbours are found by
-// comparing centres (k² comparisons of at most 512) instead of searching the map for centre texels, which gives the same set; merging and
-// splitting run in order of the index on one invocation, so that the same frame always gives the same lists. Cost: below 0.1 ms at k = 64.
+// comparing centres (k² comparisons of at most 512) instead of searching the map for centre texels, which gives the same set; the largest clusters are
+// split first and the smallest merged first, on one invocation, so that the same frame always gives the same lists; thresholds are relative, and no
+// more is merged than split (both as choices). Cost: k²/3 steps at most, far below that when nothing is out of balance.
 
 #import common::scene::Frame
 #import common::cluster::{Cluster, CLUSTER_IDLE, CLUSTER_ACTIVE, CLUSTER_RESEED, CLUSTER_PLACED, MAX_CLUSTERS}
@@ -22,6 +23,9 @@ struct Params {
 @group(0) @binding(2) var<uniform> params: Params;
 @group(0) @binding(3) var<storage, read_write> clusters_evaluated: array<Cluster>;
 @group(0) @binding(4) var rsm_flux: texture_2d<f32>;
+
+override comparison_is_relative: bool;
+override surplus_is_reseed: bool;
 
 // Share of the clusters tried in a frame: one in three, [ACRSM] 5.3.1.
 const SUBSET: u32 = 3u;
@@ -86,10 +90,28 @@ fn measure(@builtin(global_invocation_id) id: vec3u) {
     clusters_evaluated[c].delta_mean = select(delta, sum_of_squares / max(sum, 1e-30), sum > 0.0 && neighbours > 1u);
 }
 
-var<workgroup> free_list: array<u32, MAX_CLUSTERS>;
-
 fn in_subset(c: u32) -> bool {
     return clusters_evaluated[c].state == CLUSTER_ACTIVE && hash3(c, frame.index, frame.seed) % SUBSET == 0u;
+}
+
+// Left side of eq. 4.8: negative where a cluster is small for its neighbourhood.
+fn deviation(c: u32) -> f32 {
+    let mean = clusters_evaluated[c].delta_mean;
+    let difference = clusters_evaluated[c].delta - mean;
+    return select(difference, difference / max(mean, 1e-30), comparison_is_relative);
+}
+
+// The cluster of the subset that deviates most downwards (`sign` −1) or upwards (+1) beyond the threshold, or MAX_CLUSTERS.
+fn most_deviating(sign: f32, threshold: f32) -> u32 {
+    var found = MAX_CLUSTERS;
+    var most = threshold;
+    for (var c = 0u; c < params.clusters; c++) {
+        if in_subset(c) && sign * deviation(c) > most {
+            found = c;
+            most = sign * deviation(c);
+        }
+    }
+    return found;
 }
 
 // A lit texel near the centre of cluster `c`, or a negative one if none was met.
@@ -111,29 +133,30 @@ fn place_near(c: u32) -> vec2f {
 fn rebalance() {
     var free = 0u;
     if params.adaptive != 0u {
-        // Merging: [ACRSM] eq. 4.8, first case.
-        for (var c = 0u; c < params.clusters; c++) {
-            if in_subset(c) && clusters_evaluated[c].delta - clusters_evaluated[c].delta_mean < -params.merge_threshold {
-                free_list[free] = c;
-                free += 1u;
+        // [ACRSM] eq. 4.8: each split needs a merged cluster. Both lose their state, so no cluster is chosen twice.
+        for (var i = 0u; i < params.clusters; i++) {
+            let large = most_deviating(1.0, params.split_threshold);
+            let small = most_deviating(-1.0, params.merge_threshold);
+            if large == MAX_CLUSTERS || small == MAX_CLUSTERS {
+                break;
+            }
+            let texel = place_near(large);
+            clusters_evaluated[large].delta = clusters_evaluated[large].delta_mean;
+            if texel.x >= 0.0 {
+                clusters_evaluated[small].state = CLUSTER_PLACED;
+                clusters_evaluated[small].texel = texel;
+                clusters_evaluated[small].count = 0u;
             }
         }
-        for (var i = 0u; i < free; i++) {
-            clusters_evaluated[free_list[i]].state = CLUSTER_RESEED;
-            clusters_evaluated[free_list[i]].count = 0u;
-        }
-        // Splitting: second case, as long as there are free clusters.
-        for (var c = 0u; c < params.clusters && free > 0u; c++) {
-            if in_subset(c) && clusters_evaluated[c].delta - clusters_evaluated[c].delta_mean > params.split_threshold {
-                let texel = place_near(c);
-                if texel.x >= 0.0 {
-                    free -= 1u;
-                    clusters_evaluated[free_list[free]].state = CLUSTER_PLACED;
-                    clusters_evaluated[free_list[free]].texel = texel;
+        if surplus_is_reseed {
+            // Clean-up: what is still too small goes to the re-seed list.
+            for (var c = 0u; c < params.clusters; c++) {
+                if in_subset(c) && deviation(c) < -params.merge_threshold {
+                    clusters_evaluated[c].state = CLUSTER_RESEED;
+                    clusters_evaluated[c].count = 0u;
                 }
             }
         }
-        // Clean-up: what is left in the list keeps the state CLUSTER_RESEED.
     }
     // No storm of re-seeds when there is less to light than there are clusters.
     if frame.index > 0u {

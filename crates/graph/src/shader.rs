@@ -20,7 +20,7 @@ pub enum GlobalKind {
         sample: SampleKind,
         /// `texture_2d_array`.
         array: bool,
-        /// Whether any entry point uses it with a sampler (then a 32-bit float texture needs a device feature).
+        /// Whether any entry point uses it with a sampler other than `nearest_sampler` (then a 32-bit float texture needs a device feature).
         filtered: bool,
     },
     /// `texture_storage_2d<format, access>`.

@@ -221,6 +221,17 @@ pub struct ExplainArgs {
     pub format: TextOrJson,
 }
 
+/// How nodes are timed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Timing {
+    /// Serial on software adapters, timestamps elsewhere.
+    Auto,
+    /// GPU timestamps in ordinary frames.
+    Timestamps,
+    /// Each node submitted on its own and waited for.
+    Serial,
+}
+
 /// `manylight profile`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  manylight profile acrsm --scene cornell --size 256x256 --frames 32 --trace trace.json\n\
@@ -238,6 +249,9 @@ pub struct ProfileArgs {
     /// Frames to render first that are not measured
     #[arg(long, value_name = "N", default_value_t = 4)]
     pub warm_up: u32,
+    /// How nodes are timed. Timestamps of software adapters are not tied to the work around them
+    #[arg(long, value_enum, default_value = "auto")]
+    pub timing: Timing,
     /// Write a Chrome trace of the measured frames
     #[arg(long, value_name = "FILE.json")]
     pub trace: Option<PathBuf>,

@@ -5,6 +5,7 @@ use std::time::Instant;
 use manylight::{
     fault::Fault,
     files::{FileKind, check_writable},
+    gpu::GpuKind,
     renderer::Renderer,
 };
 use serde_json::json;
@@ -16,7 +17,7 @@ use super::{
     table::{Table, bytes},
 };
 use crate::{
-    cli::{Cli, ProfileArgs, TextOrJson},
+    cli::{Cli, ProfileArgs, TextOrJson, Timing},
     progress,
     samples::Samples,
     trace::Trace,
@@ -51,21 +52,44 @@ pub fn run(cli: &Cli, args: &ProfileArgs) -> Result<(), Fault> {
     }
 }
 
+/// Whether nodes are submitted one by one.
+fn is_serial(renderer: &Renderer, args: &ProfileArgs) -> bool {
+    match args.timing {
+        Timing::Auto => renderer.gpu().kind() == GpuKind::Software,
+        Timing::Timestamps => false,
+        Timing::Serial => true,
+    }
+}
+
+/// Measures ordinary frames; when nodes are timed serially, as many more for the nodes.
 fn measure(renderer: &mut Renderer, args: &ProfileArgs, mut trace: Option<&mut Trace>) -> Result<FrameSamples, Fault> {
     let mut samples = FrameSamples::new(renderer.plan());
-    let bar = progress::bar(args.frames.into(), "measuring");
-    for frame in 0..u64::from(args.frames) {
-        let from_us = trace.as_ref().map_or(0.0, |t| t.now_us());
-        let start = Instant::now();
-        renderer.render_frame(time_of(&args.frame, u64::from(args.warm_up) + frame)).map_err(of_render)?;
-        let recorded = renderer.frame().index().wrapping_sub(1);
-        // Times of an older frame are no sample of this one.
-        let timings = renderer.wait_timings().filter(|t| t.frame == recorded);
-        samples.push(timings, start.elapsed().as_secs_f64() * 1e3);
-        if let (Some(trace), Some(timings)) = (&mut trace, timings) {
-            trace.gpu_frame(timings, from_us);
+    let serial = is_serial(renderer, args);
+    let rounds: &[bool] = if serial { &[false, true] } else { &[false] };
+    let bar = progress::bar(rounds.len() as u64 * u64::from(args.frames), "measuring");
+    let mut number = u64::from(args.warm_up);
+    for &one_by_one in rounds {
+        renderer.measure_serially(one_by_one);
+        for _ in 0..args.frames {
+            let from_us = trace.as_ref().map_or(0.0, |t| t.now_us());
+            let start = Instant::now();
+            renderer.render_frame(time_of(&args.frame, number)).map_err(of_render)?;
+            number += 1;
+            let recorded = renderer.frame().index().wrapping_sub(1);
+            // Times of an older frame are no sample of this one.
+            let timings = renderer.wait_timings().filter(|t| t.frame == recorded);
+            let wall_ms = start.elapsed().as_secs_f64() * 1e3;
+            if !one_by_one {
+                samples.push_frame(timings, wall_ms);
+            }
+            if one_by_one == serial {
+                samples.push_nodes(timings);
+                if let (Some(trace), Some(timings)) = (&mut trace, timings) {
+                    trace.gpu_frame(timings, from_us);
+                }
+            }
+            bar.inc(1);
         }
-        bar.inc(1);
     }
     bar.finish_and_clear();
     Ok(samples)
@@ -119,7 +143,8 @@ fn text(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> Stri
     let all: Vec<&NodeSamples> = samples.nodes.iter().collect();
     let attributed = sum(&all, |n| n.gpu.median());
     // Work of one pass may overlap the timestamps of another: what the nodes do not account for is shown, not hidden.
-    let rest = samples.gpu.median().zip(attributed).map(|(frame, nodes)| frame - nodes).filter(|rest| *rest > 0.0);
+    let serial = is_serial(renderer, args);
+    let rest = samples.gpu.median().zip(attributed).map(|(frame, nodes)| frame - nodes).filter(|rest| *rest > 0.0 && !serial);
     let total = sum(&all, cost).map(|nodes| nodes + rest.unwrap_or(0.0));
     let columns = [("GPU median", false), ("GPU p95", false), ("share", false), ("CPU median", false), ("CPU p95", false)];
     let times = |node: &NodeSamples| {
@@ -154,9 +179,11 @@ fn text(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> Stri
     row("until the GPU is done", &samples.wall);
     row("GPU, first pass to last", &samples.gpu);
     row("CPU, record and submit", &samples.cpu);
-    let no_timestamps = if renderer.gpu().has_timestamps() { "" } else { "this adapter has no timestamps: GPU times are no sample\n" };
+    let no_timestamps =
+        if renderer.gpu().has_timestamps() || serial { "" } else { "this adapter has no timestamps: GPU times are no sample\n" };
+    let method = if serial { "; GPU: each node submitted on its own and waited for" } else { "; GPU: timestamps" };
     format!(
-        "{}{no_timestamps}\ntimes in milliseconds; CPU: to record\n{}\n{}\n{}\n{}",
+        "{}{no_timestamps}\ntimes in milliseconds{method}; CPU: to record\n{}\n{}\n{}\n{}",
         heading(renderer, args),
         nodes.render(),
         stages.render(),
@@ -200,6 +227,9 @@ fn report(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> se
         .collect();
     let mut report = stats::timings(samples);
     report["stages"] = json!(stages);
+    if is_serial(renderer, args) {
+        report["method"] = json!("serial");
+    }
     json!({
         "manylight": env!("CARGO_PKG_VERSION"),
         "pipeline": renderer.pipeline().name,

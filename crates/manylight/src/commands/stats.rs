@@ -50,16 +50,30 @@ impl FrameSamples {
 
     /// Adds a frame; `wall_ms` from the start of recording until the GPU was done.
     pub fn push(&mut self, timings: Option<&FrameTimings>, wall_ms: f64) {
-        let ms = |ns: u64| ns as f64 / 1e6;
+        self.push_frame(timings, wall_ms);
+        self.push_nodes(timings);
+    }
+
+    /// Adds the times of a frame as a whole.
+    pub fn push_frame(&mut self, timings: Option<&FrameTimings>, wall_ms: f64) {
         self.wall.push(Some(wall_ms));
         let Some(timings) = timings else { return };
-        self.cpu.push(Some(ms(timings.cpu_ns)));
-        self.gpu.push(timings.gpu_ns.map(ms));
+        self.cpu.push(Some(milliseconds(timings.cpu_ns)));
+        self.gpu.push(timings.gpu_ns.map(milliseconds));
+    }
+
+    /// Adds the times of the nodes of a frame.
+    pub fn push_nodes(&mut self, timings: Option<&FrameTimings>) {
+        let Some(timings) = timings else { return };
         for (samples, timing) in self.nodes.iter_mut().zip(&timings.nodes) {
-            samples.cpu.push(Some(ms(timing.cpu_ns)));
-            samples.gpu.push(timing.gpu_ns.map(ms));
+            samples.cpu.push(Some(milliseconds(timing.cpu_ns)));
+            samples.gpu.push(timing.gpu_ns.map(milliseconds));
         }
     }
+}
+
+fn milliseconds(ns: u64) -> f64 {
+    ns as f64 / 1e6
 }
 
 /// Median, 95th percentile and number; `null` without a sample.
@@ -88,6 +102,7 @@ pub fn timings(samples: &FrameSamples) -> Value {
         .map(|n| json!({"id": n.id, "stage": n.stage, "host": n.host, "cpu_ms": summary(&n.cpu), "gpu_ms": summary(&n.gpu)}))
         .collect();
     json!({
+        "method": "timestamps",
         "frame": {"wall_ms": summary(&samples.wall), "cpu_ms": summary(&samples.cpu), "gpu_ms": summary(&samples.gpu)},
         "nodes": nodes,
     })
