@@ -7,7 +7,7 @@
 #import common::scene::SceneInfo
 #import common::octahedral::unpack_unit
 #import common::paraboloid::{basis, paraboloid_project, paraboloid_unproject, paraboloid_scale, atlas_origin}
-#import common::poisson::POISSON_16
+#import common::disk::{TAPS, FIRST_DIRECTION, next_direction, tap_radius}
 #import common::radiometry::{PI, disk_form_factor, luminance}
 #import common::shadow::plane_reciprocal
 
@@ -68,8 +68,10 @@ fn visibility(r: Receiver, light_radius: f32) -> f32 {
     let search = clamp(params.pcss_search * light_angle * texels_per_angle, 1.0, params.pcss_limit);
     var blockers = 0.0;
     var sum = 0.0;
-    for (var i = 0u; i < 16u; i++) {
-        let ratio = tap_ratio(r, POISSON_16[i] * search);
+    var direction = FIRST_DIRECTION;
+    for (var i = 0u; i < TAPS; i++) {
+        let ratio = tap_ratio(r, direction * (tap_radius(i) * search));
+        direction = next_direction(direction);
         if ratio < threshold {
             blockers += 1.0;
             sum += ratio;
@@ -83,10 +85,12 @@ fn visibility(r: Receiver, light_radius: f32) -> f32 {
     let penumbra = light_angle * (1.0 - ratio) / ratio * texels_per_angle;
     let radius = clamp(penumbra, 1.0, params.pcss_limit);
     var lit = 0.0;
-    for (var i = 0u; i < 16u; i++) {
-        lit += select(0.0, 1.0, tap_ratio(r, POISSON_16[i] * radius) >= threshold);
+    direction = FIRST_DIRECTION;
+    for (var i = 0u; i < TAPS; i++) {
+        lit += select(0.0, 1.0, tap_ratio(r, direction * (tap_radius(i) * radius)) >= threshold);
+        direction = next_direction(direction);
     }
-    return lit / 16.0;
+    return lit / f32(TAPS);
 }
 
 @compute @workgroup_size(8, 8)

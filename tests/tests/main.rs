@@ -4,6 +4,7 @@
 mod cli;
 mod clustering;
 mod determinism;
+mod moving_light;
 mod reference;
 mod renders;
 mod support;

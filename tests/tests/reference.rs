@@ -90,7 +90,8 @@ fn surfels_are_better_than_the_papers_splats() {
     assert!(default.0 < 0.75 * paper.0, "surfels {}, squares {}", default.0, paper.0);
 }
 
-/// Away from shadow edges, where the reference is smooth: edges are a matter of the shadow map's resolution and the pixel filter.
+/// Away from shadow edges and edges of facets, which a pixel of the reference averages over: edges are a matter of the shadow map's resolution
+/// and of the pixel filter. Only lit pixels count, so that black ones do not dilute the error.
 #[test]
 fn direct_light_is_the_reference_away_from_shadow_edges() {
     for scene in scenes() {
@@ -98,28 +99,28 @@ fn direct_light_is_the_reference_away_from_shadow_edges() {
         let (image, reference) = (read(&renderer, "direct"), exr(&scene.reference.join("direct.exr")));
         let (normals, depths) = (read(&renderer, "gbuffer_normal"), read(&renderer, "gbuffer_depth"));
         let smooth = |x: u32, y: u32| {
-            let reach = 4;
+            let reach = 2;
             let centre = reference_rgb(&reference, x, y);
             let (n, d) = (rgb(&normals, x, y), depths.pixel(x, y)[0]);
             (y.saturating_sub(reach)..=(y + reach).min(image.height - 1)).all(|j| {
                 (x.saturating_sub(reach)..=(x + reach).min(image.width - 1)).all(|i| {
                     let (m, e) = (rgb(&normals, i, j), depths.pixel(i, j)[0]);
                     let near = reference_rgb(&reference, i, j);
-                    let same_surface = (0..3).map(|k| n[k] * m[k]).sum::<f64>() > 0.95 && (d - e).abs() < 0.05 * d.max(e);
+                    let same_facet = (0..3).map(|k| n[k] * m[k]).sum::<f64>() > 0.9999 && (d - e).abs() < 0.05 * d.max(e);
                     // A neighbour that is black where this is lit, or the other way round, is a shadow edge.
-                    same_surface && (centre[0] <= 0.0) == (near[0] <= 0.0) && (centre[0] - near[0]).abs() <= 0.3 * centre[0].max(near[0])
+                    same_facet && (centre[0] <= 0.0) == (near[0] <= 0.0) && (centre[0] - near[0]).abs() <= 0.3 * centre[0].max(near[0])
                 })
             })
         };
-        let pixels: Vec<_> = (0..image.height).flat_map(|y| (0..image.width).map(move |x| (x, y))).filter(|&(x, y)| smooth(x, y)).collect();
+        let pixels: Vec<_> = (0..image.height).flat_map(|y| (0..image.width).map(move |x| (x, y))).filter(|&(x, y)| reference_rgb(&reference, x, y)[0] > 0.0 && smooth(x, y)).collect();
         let mean_reference = mean(pixels.iter().flat_map(|&(x, y)| reference_rgb(&reference, x, y)));
         let rmse = mean(pixels.iter().flat_map(|&(x, y)| {
             let (a, b) = (rgb(&image, x, y), reference_rgb(&reference, x, y));
             (0..3).map(move |i| (a[i] - b[i]).powi(2))
         }))
         .sqrt();
-        println!("{}: RMSE {:.2} % of the mean over {} smooth pixels", scene.name, 100.0 * rmse / mean_reference, pixels.len());
-        assert!(pixels.len() > 10_000, "{}: only {} smooth pixels", scene.name, pixels.len());
+        println!("{}: RMSE {:.2} % of the mean over {} smooth lit pixels", scene.name, 100.0 * rmse / mean_reference, pixels.len());
+        assert!(pixels.len() > 1_000, "{}: only {} smooth lit pixels", scene.name, pixels.len());
         assert!(rmse <= 0.03 * mean_reference, "{}: RMSE {:.2} % of the mean", scene.name, 100.0 * rmse / mean_reference);
     }
 }

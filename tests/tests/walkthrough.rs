@@ -51,7 +51,7 @@ fn a_node_in_ten_minutes() {
     // The page's mistake.
     let shader = folder.join("shaders/views/edges.wgsl");
     let text = fs::read_to_string(&shader).expect("a shader");
-    fs::write(&shader, text.replacen("strength: f32", "strenght: f32", 1)).expect("written");
+    fs::write(&shader, text.replace("strength", "strenght")).expect("written");
     manylight_in(folder, &["check", "shaders/views/edges.ron"]).expect(1).says(&["edges.wgsl", "strenght", "strength"]);
 }
 

@@ -165,8 +165,10 @@ fn index(nodes: &BTreeMap<String, String>) -> String {
 fn first_sentence(page: &str) -> String {
     let paragraph: Vec<&str> = page.lines().skip(1).map(str::trim).skip_while(|l| l.is_empty()).take_while(|l| !l.is_empty()).collect();
     let paragraph = paragraph.join(" ");
-    match paragraph.split_once(". ") {
-        Some((sentence, _)) => format!("{sentence}."),
+    // A full stop before a number or a small letter is that of an abbreviation: `eqs. 4.4`.
+    let goes_on = |rest: &str| rest.starts_with(|c: char| c.is_ascii_digit() || c.is_lowercase());
+    match paragraph.match_indices(". ").find(|(at, stop)| !goes_on(&paragraph[at + stop.len()..])) {
+        Some((at, _)) => paragraph[..=at].to_owned(),
         None => paragraph,
     }
 }
@@ -224,6 +226,15 @@ mod tests {
         );
         assert_eq!(summary_with(&after, &split(OUTPUT)).unwrap(), after);
         assert_eq!(summary_with("# Summary\n", &split(OUTPUT)), None);
+    }
+
+    #[test]
+    fn an_abbreviation_ends_no_sentence() {
+        assert_eq!(
+            first_sentence("# a/b\n\nMaps texels ([ACRSM] 4.6, eqs. 4.4 and 4.5; cf. fig. 2). More.\n"),
+            "Maps texels ([ACRSM] 4.6, eqs. 4.4 and 4.5; cf. fig. 2)."
+        );
+        assert_eq!(first_sentence("# a/b\n\nOne sentence.\n"), "One sentence.");
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! Checks a pipeline without a scene and without a GPU, for every option of every parameter.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use crate::{
     assign::Values,
-    diagnostics::{Diagnostic, Diagnostics, Severity},
+    diagnostics::{Diagnostic, Diagnostics, Severity, Source},
     features,
     library::Library,
     pipeline::{Gaps, Pipeline},
@@ -68,11 +68,16 @@ pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
 /// Reads a pipeline and checks it: all faults of its text and of its meaning at once.
 /// `path` is a file on disk, a path of the library, or a name in `pipelines/`.
 pub fn check_file(library: &Library, path: impl AsRef<Path>, registry: &Registry) -> Diagnostics {
-    let (pipeline, mut faults) = Pipeline::load_with_gaps(library, path.as_ref());
+    check_with_sources(library, path, registry).0
+}
+
+/// As [`check_file`], with every file that was read: the pipeline's own first, and those that it extends and includes.
+pub fn check_with_sources(library: &Library, path: impl AsRef<Path>, registry: &Registry) -> (Diagnostics, Vec<Arc<Source>>) {
+    let (pipeline, sources, mut faults) = Pipeline::load_with_gaps(library, path.as_ref());
     if let Some(pipeline) = pipeline {
         faults.extend(check(&pipeline, registry));
     }
-    faults.sorted()
+    (faults.sorted(), sources)
 }
 
 /// The sentence without the values in it.

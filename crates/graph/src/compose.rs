@@ -56,6 +56,13 @@ pub(crate) struct Resolved {
     pub faulty: bool,
 }
 
+/// What a text imports by itself.
+struct Direct {
+    modules: BTreeSet<String>,
+    /// Items that a module does not have: the module and the fault.
+    lacking: Vec<(String, Diagnostic)>,
+}
+
 impl Composition {
     /// Takes in all modules and checks each by itself, save those whose hash is in `known_good`.
     pub fn new(sources: Vec<(String, Arc<Source>)>, known_good: &BTreeSet<u64>, out: &mut Vec<Diagnostic>) -> Self {
@@ -67,13 +74,15 @@ impl Composition {
         }
         let mut this = Self { modules, composer: None, order: Vec::new() };
         let mut direct = BTreeMap::new();
+        let mut lacking = Vec::new();
         for name in this.modules.keys().cloned().collect::<Vec<_>>() {
             let module = &this.modules[&name];
             let before = out.len();
             check_common(module, out);
-            let found = this.direct_imports(&module.source, &module.scan, out);
-            let faulty = out.len() > before;
+            let Direct { modules: found, lacking: lacks } = this.direct_imports(&module.source, &module.scan, out);
+            let faulty = out.len() > before || !lacks.is_empty();
             direct.insert(name.clone(), found);
+            lacking.extend(lacks);
             if let Some(module) = this.modules.get_mut(&name) {
                 module.faulty = faulty;
             }
@@ -91,7 +100,13 @@ impl Composition {
                 this.mark_faulty(&name);
             }
         }
+        out.extend(this.own(lacking));
         this
+    }
+
+    /// Missing items, save those of modules that have faults: an item that cannot be read is not missing.
+    fn own(&self, lacking: Vec<(String, Diagnostic)>) -> impl Iterator<Item = Diagnostic> + use<'_> {
+        lacking.into_iter().filter(|(module, _)| !self.modules[module].faulty).map(|(_, fault)| fault)
     }
 
     /// Hashes of the modules without faults.
@@ -103,7 +118,8 @@ impl Composition {
     pub fn resolve(&self, source: &Arc<Source>, out: &mut Vec<Diagnostic>) -> Resolved {
         let scan = wgsl::scan(&source.text);
         let before = out.len();
-        let direct = self.direct_imports(source, &scan, out);
+        let Direct { modules: direct, lacking } = self.direct_imports(source, &scan, out);
+        out.extend(self.own(lacking));
         let mut imports = direct.clone();
         for name in &direct {
             imports.extend(self.modules[name].imports.iter().cloned());
@@ -122,8 +138,9 @@ impl Composition {
         self.modules.contains_key(module).then(|| (module.to_owned(), Some(item)))
     }
 
-    fn direct_imports(&self, source: &Arc<Source>, scan: &Scan, out: &mut Vec<Diagnostic>) -> BTreeSet<String> {
+    fn direct_imports(&self, source: &Arc<Source>, scan: &Scan, out: &mut Vec<Diagnostic>) -> Direct {
         let mut found = BTreeSet::new();
+        let mut lacking = Vec::new();
         let mut named: BTreeSet<&str> = BTreeSet::new();
         if let Some((range, what)) = wgsl::too_deep(&source.text) {
             let fault = Diagnostic::error(format!("{what} are nested too deeply"), Span::new(source, range));
@@ -145,7 +162,8 @@ impl Composition {
                     let items = &self.modules[&module].scan.items;
                     if !items.iter().any(|i| i.name == item) {
                         let known = items.iter().map(|i| i.name.as_str());
-                        out.push(Diagnostic::error(format!("`{module}` has no item `{item}`"), span).help(suggest(item, known)));
+                        let fault = Diagnostic::error(format!("`{module}` has no item `{item}`"), span).help(suggest(item, known));
+                        lacking.push((module.clone(), fault));
                     }
                     found.insert(module);
                 }
@@ -165,7 +183,7 @@ impl Composition {
         for path in scan.paths.iter().filter(|p| !p.import) {
             found.extend(self.module_of(&path.text).map(|(module, _)| module));
         }
-        found
+        Direct { modules: found, lacking }
     }
 
     /// Orders the modules; those in or behind a cycle are faulty and left out.

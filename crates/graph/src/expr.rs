@@ -80,8 +80,9 @@ pub(crate) fn eval(expr: &Expr, scope: &dyn Scope) -> Result<u64, EvalError> {
         Expr::Add(list) => all(list, 0, &|a, b| a.checked_add(b)),
         Expr::Min(list) => all(list, u64::MAX, &|a, b| Some(a.min(b))),
         Expr::Max(list) => all(list, 0, &|a, b| Some(a.max(b))),
-        Expr::DivCeil(a, b) => match eval(b, scope)? {
+        Expr::DivCeil(a, b) | Expr::Div(a, b) => match eval(b, scope)? {
             0 => Err(EvalError::DivisionByZero),
+            b if matches!(expr, Expr::Div(..)) => Ok(eval(a, scope)? / b),
             b => Ok(eval(a, scope)?.div_ceil(b)),
         },
         Expr::NextPowerOfTwo(a) => eval(a, scope)?.checked_next_power_of_two().ok_or(EvalError::Overflow),
@@ -89,7 +90,7 @@ pub(crate) fn eval(expr: &Expr, scope: &dyn Scope) -> Result<u64, EvalError> {
 }
 
 const FORMS: &[&str] =
-    &["Param", "Width", "Height", "Elements", "Mul", "Add", "Min", "Max", "DivCeil", "NextPowerOfTwo", "OutputWidth", "OutputHeight"];
+    &["Param", "Width", "Height", "Elements", "Mul", "Add", "Min", "Max", "Div", "DivCeil", "NextPowerOfTwo", "OutputWidth", "OutputHeight"];
 
 /// Reads an expression.
 pub(crate) fn read(reader: &mut Reader, tree: &Tree) -> Option<ExprAt> {
@@ -148,13 +149,14 @@ fn read_into(reader: &mut Reader, tree: &Tree, refs: &mut Vec<ExprRef>) -> Optio
                         _ => Expr::Max(terms),
                     })
                 }
-                "DivCeil" => {
+                "Div" | "DivCeil" => {
                     let [a, b] = items.as_slice() else {
-                        reader.error(&tree.range, "`DivCeil` takes two expressions", "write `DivCeil(a, b)`");
+                        reader.error(&tree.range, format!("`{text}` takes two expressions"), format!("write `{text}(a, b)`"));
                         return None;
                     };
                     let (a, b) = (read_into(reader, a, refs), read_into(reader, b, refs));
-                    Some(Expr::DivCeil(Box::new(a?), Box::new(b?)))
+                    let (a, b) = (Box::new(a?), Box::new(b?));
+                    Some(if text == "Div" { Expr::Div(a, b) } else { Expr::DivCeil(a, b) })
                 }
                 "NextPowerOfTwo" => {
                     let [a] = items.as_slice() else {

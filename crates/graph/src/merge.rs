@@ -21,13 +21,13 @@ impl Pipeline {
     /// All faults of all files that it reads.
     pub fn load(library: &Library, path: impl AsRef<Path>) -> Result<Self, Diagnostics> {
         match Self::load_with_gaps(library, path.as_ref()) {
-            (Some(pipeline), faults) if !faults.has_errors() => Ok(pipeline),
-            (_, faults) => Err(faults),
+            (Some(pipeline), _, faults) if !faults.has_errors() => Ok(pipeline),
+            (_, _, faults) => Err(faults),
         }
     }
 
-    /// As [`load`](Self::load), but what can be read of a pipeline with faults is returned, too.
-    pub(crate) fn load_with_gaps(library: &Library, path: &Path) -> (Option<Self>, Diagnostics) {
+    /// As [`load`](Self::load), but what can be read of a pipeline with faults is returned, too, and every file that was read.
+    pub(crate) fn load_with_gaps(library: &Library, path: &Path) -> (Option<Self>, Vec<Arc<Source>>, Diagnostics) {
         let (source, library_path) = match library.find(path) {
             Ok(found) => found,
             Err(error) => {
@@ -36,17 +36,17 @@ impl Pipeline {
                     ReadError::Missing(name) => fault.help(library.suggest_document(&name)),
                     ReadError::Unreadable { .. } => fault,
                 };
-                return (None, fault.into());
+                return (None, Vec::new(), fault.into());
             }
         };
         let mut loader = Loader { library, out: Vec::new(), sources: Vec::new(), stack: Vec::new(), loaded: BTreeSet::new() };
         let layer = loader.file(&source, library_path.as_deref(), false);
         let Loader { mut out, sources, .. } = loader;
-        let pipeline = layer.and_then(|layer| layer.finish(stem(&source.name), sources, &mut out));
+        let pipeline = layer.and_then(|layer| layer.finish(stem(&source.name), sources.clone(), &mut out));
         if pipeline.is_none() && out.is_empty() {
             out.push(Diagnostic::error("the file has no pipeline", Span::new(&source, 0..0)));
         }
-        (pipeline, Diagnostics(out).sorted())
+        (pipeline, sources, Diagnostics(out).sorted())
     }
 }
 

@@ -85,6 +85,8 @@ pub enum Expr {
     Add(Vec<Expr>),
     /// Quotient rounded up; division by zero is an error of the check.
     DivCeil(Box<Expr>, Box<Expr>),
+    /// Quotient rounded down; division by zero is an error of the check.
+    Div(Box<Expr>, Box<Expr>),
     Min(Vec<Expr>),
     Max(Vec<Expr>),
     /// Smallest power of two that is not below.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use manylight_gpu::{HostNodes, WatchSet};
 use manylight_graph::{
+    check,
     diagnostics::{Diagnostic, Diagnostics},
     library::Library,
     pipeline::Pipeline,
@@ -56,7 +57,12 @@ impl Documents {
     fn with(library: Library, registry: Registry, registry_faults: Diagnostics, path: &Path) -> Result<Self, Diagnostics> {
         match Pipeline::load(&library, path) {
             Ok(pipeline) => Ok(Self { library, registry, registry_faults, pipeline, path: path.to_owned() }),
-            Err(faults) => Err(together(registry_faults, faults)),
+            // Faults of its meaning are told together with those of its text.
+            Err(faults) => {
+                let all = check::check_file(&library, path, &registry);
+                // Mended between the two readings: the faults are those of the first.
+                Err(together(registry_faults, if all.has_errors() { all } else { faults }))
+            }
         }
     }
 

@@ -170,7 +170,7 @@ fn step_params(step: &Step, found: &mut BTreeSet<String>) {
                 found.insert(name.clone());
             }
             Expr::Mul(list) | Expr::Add(list) | Expr::Min(list) | Expr::Max(list) => list.iter().for_each(|e| walk(e, found)),
-            Expr::DivCeil(a, b) => {
+            Expr::DivCeil(a, b) | Expr::Div(a, b) => {
                 walk(a, found);
                 walk(b, found);
             }

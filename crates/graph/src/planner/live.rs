@@ -118,11 +118,14 @@ impl<'a> Planner<'a, '_> {
         }
         for name in &self.input.keep {
             if !pipeline.resources.contains_key(name) {
+                if pipeline.gaps.files || pipeline.gaps.resources.contains(name) {
+                    continue;
+                }
                 let help = suggest(name, pipeline.resources.keys().map(String::as_str));
                 self.out.push(Diagnostic::error_nowhere(format!("the pipeline `{}` has no resource `{name}`", pipeline.name)).help(help));
             } else if let Some(node) = activity.producer.get(name.as_str()) {
                 wanted.push(*node);
-            } else {
+            } else if !self.linked.tainted.contains(name) && !self.linked.incomplete {
                 let why = self.producers_off(name, activity);
                 self.out.push(
                     Diagnostic::error_nowhere(format!("`{name}` is not written in this frame{why}"))

@@ -292,6 +292,8 @@ fn faults_of_imported_files_point_there_and_are_told_once() {
         1,
         &["the name `count2` cannot be shared between files", "shaders/common/cell.wgsl:1", "must not end in a digit"],
     );
+    one(COMMON, "struct Cell", "struc Cell", &["found \"struc\"", "cell.wgsl:1:1"]);
+    one(COMMON, "fn area", "fnn area", &["found \"fnn\"", "cell.wgsl:6:1"]);
     one(COMMON, "fn area", "@compute fn area", &["shaders/common has no entry points", "cell.wgsl:6:1"]);
     one(COMMON, "fn area", "@group(0) fn area", &["shaders/common has no bindings", "cell.wgsl:6:1"]);
     one(COMMON, "fn area", "override k: u32;\nfn area", &["no overrides, and `k` is one", "cell.wgsl:6:10"]);

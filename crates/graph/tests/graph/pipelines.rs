@@ -259,6 +259,9 @@ fn sizes() {
         "count: Mul([Param(\"count\"), 4611686018427387904, 16])",
         &["the number of elements of `cells` cannot be computed: the result does not fit in 64 bits", "13:44"],
     );
+    one(COUNT, "count: Div(Param(\"count\"), 0)", &["cannot be computed: division by zero", "13:44"]);
+    one(COUNT, "count: Div(3)", &["`Div` takes two expressions", "13:44", "write `Div(a, b)`"]);
+    one(COUNT, "count: Div(3, Param(\"cout\"))", &["no parameter `cout`", "13:57", "`count`"]);
     one(COUNT, "count: DivCeil(Param(\"count\"), 0)", &["cannot be computed: division by zero", "13:44"]);
     one(COUNT, "count: Mul([Param(\"count\"), -1])", &["sizes and counts are not negative", "13:65"]);
     one(COUNT, "count: Mul(Param(\"count\"))", &["expected a list of expressions", "13:48"]);

@@ -74,6 +74,18 @@ fn draws_have_targets_and_vertices() {
 }
 
 #[test]
+fn nothing_follows_from_a_shader_with_faults() {
+    let files = with("shaders/draw/paint.wgsl", "fn paint(", "fnn paint(");
+    let (registry, faults) = registry(&files, &[]);
+    assert_faults(&faults.render(), 1, &["found \"fnn\""]);
+    let pipeline = manylight_graph::pipeline::Pipeline::load(&library(&files), "test").unwrap();
+    assert_eq!(manylight_graph::check::check(&pipeline, &registry).render(), "");
+    let input = PlanInput { keep: vec!["picture".into(), "cells".into()], ..input() };
+    let faults = manylight_graph::planner::plan(&pipeline, &registry, &input).unwrap_err();
+    assert_faults(&faults.render(), 1, &["the node `draw/paint` cannot be used"]);
+}
+
+#[test]
 fn kept_resources_keep_their_nodes_alive() {
     let plan = try_plan(&files(), &PlanInput { keep: vec!["albedo".into()], ..input() }).unwrap();
     assert_eq!(ids(&plan), ["scene", "paint", "pyramid", "soft", "show"]);
@@ -254,4 +266,18 @@ fn externals_have_the_layout_that_rust_fills() {
             "scene.wgsl:1:8",
         ],
     );
+}
+
+#[test]
+fn quotients_round_down_or_up() {
+    let count = |expr: &str| {
+        let files = with(FILE, "count: Mul([Param(\"count\"), 2])", &format!("count: {expr}"));
+        let plan = try_plan(&files, &input()).unwrap();
+        match plan.resources[plan.resource("cells").unwrap()].desc {
+            ResourceDesc::Buffer { count, .. } => count,
+            ResourceDesc::Texture { .. } => 0,
+        }
+    };
+    assert_eq!((count("Div(Param(\"count\"), 96)"), count("DivCeil(Param(\"count\"), 96)")), (1, 2));
+    assert_eq!((count("Div(192, 96)"), count("DivCeil(192, 96)")), (2, 2));
 }

@@ -9,10 +9,9 @@ use manylight::{
     SceneSource,
     fault::Fault,
     graph::{
-        check::check,
+        check::{check_file, check_with_sources},
         diagnostics::{Diagnostic, Diagnostics},
         library::Library,
-        pipeline::Pipeline,
         registry::Registry,
     },
     library, load_registry,
@@ -66,12 +65,6 @@ impl Loaded {
         let part = |path: &String| path.starts_with("pipelines/stages/") || path.starts_with("pipelines/sweeps/");
         self.library.list("pipelines", "ron").into_iter().filter(|path| !part(path)).collect()
     }
-
-    fn check_pipeline(&self, path: &Path) -> Result<Pipeline, Diagnostics> {
-        let pipeline = Pipeline::load(&self.library, path)?;
-        let found = check(&pipeline, &self.registry);
-        if found.is_empty() { Ok(pipeline) } else { Err(found) }
-    }
 }
 
 /// What a RON file is, by its outermost name.
@@ -104,9 +97,7 @@ impl Checker {
 
     fn pipeline(&mut self, loaded: &Loaded, path: &Path) {
         *self.counts.entry("pipeline").or_default() += 1;
-        if let Err(found) = loaded.check_pipeline(path) {
-            self.found.extend(found);
-        }
+        self.found.extend(check_file(&loaded.library, path, &loaded.registry));
     }
 
     fn file(&mut self, library: &Library, path: &Path) {
@@ -183,18 +174,8 @@ impl Checker {
         let mut used = false;
         for name in loaded.pipelines() {
             let Some(file) = loaded.library.root().map(|root| root.join(&name)) else { continue };
-            let (includes, found) = match Pipeline::load(&loaded.library, &file) {
-                Ok(pipeline) => {
-                    let includes = pipeline.sources.iter().any(|s| s.path.as_deref().and_then(|p| p.canonicalize().ok()) == own);
-                    (includes, check(&pipeline, &loaded.registry))
-                }
-                Err(found) => {
-                    let names =
-                        |d: &Diagnostic| d.labels.iter().any(|l| l.span.source.path.as_deref().and_then(|p| p.canonicalize().ok()) == own);
-                    (found.0.iter().any(names), found)
-                }
-            };
-            if includes {
+            let (found, sources) = check_with_sources(&loaded.library, &file, &loaded.registry);
+            if sources.iter().any(|s| s.path.as_deref().and_then(|p| p.canonicalize().ok()) == own) {
                 used = true;
                 self.found.extend(found);
             }

@@ -5,7 +5,6 @@ use std::time::Instant;
 use manylight::{
     fault::Fault,
     files::{FileKind, check_writable},
-    gpu::GpuKind,
     renderer::Renderer,
 };
 use serde_json::json;
@@ -55,7 +54,7 @@ pub fn run(cli: &Cli, args: &ProfileArgs) -> Result<(), Fault> {
 /// Whether nodes are submitted one by one.
 fn is_serial(renderer: &Renderer, args: &ProfileArgs) -> bool {
     match args.timing {
-        Timing::Auto => renderer.gpu().kind() == GpuKind::Software,
+        Timing::Auto => stats::serial_by_default(renderer.gpu()),
         Timing::Timestamps => false,
         Timing::Serial => true,
     }
@@ -225,11 +224,8 @@ fn report(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> se
             })
         })
         .collect();
-    let mut report = stats::timings(samples);
+    let mut report = stats::timings(samples, is_serial(renderer, args));
     report["stages"] = json!(stages);
-    if is_serial(renderer, args) {
-        report["method"] = json!("serial");
-    }
     json!({
         "manylight": env!("CARGO_PKG_VERSION"),
         "pipeline": renderer.pipeline().name,

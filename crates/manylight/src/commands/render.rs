@@ -13,7 +13,7 @@ use super::{
     of_file,
     outputs::Outputs,
     session::{Session, of_render, settings, time_of},
-    stats::{self, FrameSamples},
+    stats::{self, FrameSamples, serial_by_default},
 };
 use crate::{
     cli::{Cli, RenderArgs},
@@ -57,13 +57,26 @@ fn check(args: &RenderArgs, outputs: &Outputs) -> Result<(), Fault> {
 fn frames(renderer: &mut Renderer, args: &RenderArgs) -> Result<FrameSamples, Fault> {
     let mut samples = FrameSamples::new(renderer.plan());
     let bar = progress::bar(args.frames.into(), "rendering");
+    // Where timestamps say nothing of single nodes, every other frame is measured node by node; the picture is the same.
+    let serial = args.stats.is_some() && serial_by_default(renderer.gpu());
     for frame in 0..u64::from(args.frames) {
+        let one_by_one = serial && frame % 2 == 1;
+        renderer.measure_serially(one_by_one);
         let start = Instant::now();
         renderer.render_frame(time_of(&args.frame, frame)).map_err(of_render)?;
-        let timings = renderer.wait_timings();
-        samples.push(timings, start.elapsed().as_secs_f64() * 1e3);
+        let recorded = renderer.frame().index().wrapping_sub(1);
+        // Times of an older frame are no sample of this one.
+        let timings = renderer.wait_timings().filter(|t| t.frame == recorded);
+        let wall_ms = start.elapsed().as_secs_f64() * 1e3;
+        if !one_by_one {
+            samples.push_frame(timings, wall_ms);
+        }
+        if one_by_one == serial {
+            samples.push_nodes(timings);
+        }
         bar.inc(1);
     }
+    renderer.measure_serially(false);
     bar.finish_and_clear();
     Ok(samples)
 }
@@ -84,7 +97,7 @@ fn stats(renderer: &Renderer, args: &RenderArgs, samples: &FrameSamples) -> Resu
         "seed": args.frame.seed,
         "adapter": stats::adapter(renderer.gpu()),
         "parameters": stats::parameters(plan),
-        "timings": stats::timings(samples),
+        "timings": stats::timings(samples, serial_by_default(renderer.gpu())),
         "memory": stats::memory(renderer),
         "plan": plan.to_json(),
         "sums": stats::sums(renderer, &names)?,

@@ -2,7 +2,7 @@
 
 use manylight::{
     fault::Fault,
-    gpu::{FrameTimings, Gpu, Image, memory::Holding},
+    gpu::{FrameTimings, Gpu, GpuKind, Image, memory::Holding},
     graph::{
         plan::Plan,
         value::{ResourceDesc, Value as Parameter},
@@ -48,13 +48,7 @@ impl FrameSamples {
         Self { nodes: nodes.collect(), ..Self::default() }
     }
 
-    /// Adds a frame; `wall_ms` from the start of recording until the GPU was done.
-    pub fn push(&mut self, timings: Option<&FrameTimings>, wall_ms: f64) {
-        self.push_frame(timings, wall_ms);
-        self.push_nodes(timings);
-    }
-
-    /// Adds the times of a frame as a whole.
+    /// Adds the times of a frame as a whole; `wall_ms` from the start of recording until the GPU was done.
     pub fn push_frame(&mut self, timings: Option<&FrameTimings>, wall_ms: f64) {
         self.wall.push(Some(wall_ms));
         let Some(timings) = timings else { return };
@@ -95,14 +89,20 @@ pub fn adapter(gpu: &Gpu) -> Value {
     })
 }
 
-pub fn timings(samples: &FrameSamples) -> Value {
+/// Whether nodes are best timed by submitting one after the other: timestamps of a software adapter are not tied to the work around them.
+pub fn serial_by_default(gpu: &Gpu) -> bool {
+    gpu.kind() == GpuKind::Software
+}
+
+/// All times; `serial`: nodes were submitted one after the other.
+pub fn timings(samples: &FrameSamples, serial: bool) -> Value {
     let nodes: Vec<Value> = samples
         .nodes
         .iter()
         .map(|n| json!({"id": n.id, "stage": n.stage, "host": n.host, "cpu_ms": summary(&n.cpu), "gpu_ms": summary(&n.gpu)}))
         .collect();
     json!({
-        "method": "timestamps",
+        "method": if serial { "serial" } else { "timestamps" },
         "frame": {"wall_ms": summary(&samples.wall), "cpu_ms": summary(&samples.cpu), "gpu_ms": summary(&samples.gpu)},
         "nodes": nodes,
     })
