@@ -54,17 +54,18 @@ fn median_of_four(v: vec4f) -> f32 {
     return select(second, least, count == 2u);
 }
 
+fn splat_at(texel: vec2u) -> f32 {
+    let size = textureDimensions(ism);
+    if any(texel >= size) {
+        return NOTHING;
+    }
+    return bitcast<f32>(ism_splats[texel.y * size.x + texel.x]);
+}
+
 @compute @workgroup_size(8, 8)
 fn pull_push(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_id) local: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let size = textureDimensions(ism);
     let corner = 2u * id.xy;
-    // Sides of the atlas are even: all four texels are inside, or none is.
-    let inside = all(corner < size);
-    var values = vec4f(NOTHING);
-    if inside {
-        let at = corner.y * size.x + corner.x;
-        values = bitcast<vec4f>(vec4u(ism_splats[at], ism_splats[at + 1u], ism_splats[at + size.x], ism_splats[at + size.x + 1u]));
-    }
+    var values = vec4f(splat_at(corner), splat_at(corner + vec2u(1u, 0u)), splat_at(corner + vec2u(0u, 1u)), splat_at(corner + vec2u(1u, 1u)));
     if params.pull_push > 0u {
         levels[lane] = median_of_four(values);
         for (var level = 2u; level <= params.pull_push; level++) {
@@ -86,10 +87,9 @@ fn pull_push(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation
         }
         values = select(values, vec4f(fill), values >= vec4f(NOTHING));
     }
-    if inside {
-        textureStore(ism, corner, vec4f(values.x, 0.0, 0.0, 0.0));
-        textureStore(ism, corner + vec2u(1u, 0u), vec4f(values.y, 0.0, 0.0, 0.0));
-        textureStore(ism, corner + vec2u(0u, 1u), vec4f(values.z, 0.0, 0.0, 0.0));
-        textureStore(ism, corner + vec2u(1u, 1u), vec4f(values.w, 0.0, 0.0, 0.0));
-    }
+    // Stores outside, at odd sizes, have no effect.
+    textureStore(ism, corner, vec4f(values.x, 0.0, 0.0, 0.0));
+    textureStore(ism, corner + vec2u(1u, 0u), vec4f(values.y, 0.0, 0.0, 0.0));
+    textureStore(ism, corner + vec2u(0u, 1u), vec4f(values.z, 0.0, 0.0, 0.0));
+    textureStore(ism, corner + vec2u(1u, 1u), vec4f(values.w, 0.0, 0.0, 0.0));
 }

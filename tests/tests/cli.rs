@@ -68,6 +68,15 @@ fn a_wrong_parameter_is_named_with_the_nearest_right_one() {
     set("visibility=pcs").expect(1).says(&["pcss"]);
 }
 
+/// `check` tries the ends of other parameters' ranges beside it, which may be too much together: no fault of the preset.
+#[test]
+fn a_preset_at_the_end_of_a_range_is_no_fault() {
+    let library = copy_of_library();
+    fs::write(library.path().join("pipelines/many.ron"), "Pipeline(doc: \"many\", extends: \"acrsm.ron\", set: {\"clusters\": 512})")
+        .expect("written");
+    manylight_in(library.path(), &["check", "pipelines/many.ron"]).expect(0).says(&["warning", "ism_size"]);
+}
+
 #[test]
 fn a_typo_in_a_pipeline_is_shown_with_line_and_caret() {
     let library = copy_of_library();

@@ -29,7 +29,7 @@ pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
     let all = |on: bool| -> BTreeMap<String, bool> { features::KNOWN.iter().map(|f| ((*f).to_owned(), on)).collect() };
     let (none, every) = (all(false), all(true));
 
-    let mut attempt = |values: &Values<'_>, features: &BTreeMap<String, bool>, when: &str| {
+    let mut attempt = |values: &Values<'_>, features: &BTreeMap<String, bool>, when: &str, worst: Severity| {
         for fault in faults(&linked, values, features) {
             // One cause shows in many variants: it is told once, with the first variant that has it.
             let same = |other: &Diagnostic| {
@@ -39,24 +39,28 @@ pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
                 continue;
             }
             known.push(fault.clone());
-            out.push(if when.is_empty() { fault } else { Diagnostic { message: format!("{} ({when})", fault.message), ..fault } });
+            let severity = fault.severity.min(worst);
+            let message = if when.is_empty() { fault.message } else { format!("{} ({when})", fault.message) };
+            out.push(Diagnostic { message, severity, ..fault });
         }
     };
-    attempt(&values, &every, "");
-    attempt(&values, &none, "when the scene has no special features");
+    attempt(&values, &every, "", Severity::Error);
+    attempt(&values, &none, "when the scene has no special features", Severity::Error);
     for name in features::KNOWN {
         let mut one = none.clone();
         one.insert((*name).to_owned(), true);
-        attempt(&values, &one, &format!("when the scene has only `{name}`"));
+        attempt(&values, &one, &format!("when the scene has only `{name}`"), Severity::Error);
     }
     for (name, param) in &pipeline.params {
         let current = values.get(name).cloned();
+        // The end of a range may be too much beside another parameter's value (memory, say): that is good to know, and no fault of the pipeline.
+        let worst = if matches!(param.kind, ParamKind::Int { .. }) { Severity::Warning } else { Severity::Error };
         for value in variants(&param.kind).into_iter().filter(|v| Some(v) != current.as_ref()) {
             let when = format!("when `{name}` is `{value}`");
             let mut changed = values.clone();
             changed.replace(name, value);
-            attempt(&changed, &every, &when);
-            attempt(&changed, &none, &when);
+            attempt(&changed, &every, &when, worst);
+            attempt(&changed, &none, &when, worst);
         }
     }
     if pipeline.gaps == Gaps::default() && !out.iter().any(|d| d.severity == Severity::Error) {

@@ -160,8 +160,10 @@ fn made_of(node: &NodeDecl) -> String {
     }
 }
 
+/// Up to the first full stop before a capital letter: "eqs. 4.4" and "cf. fig. 2" end no sentence.
 fn first_sentence(doc: &str) -> &str {
-    doc.split_inclusive(". ").next().unwrap_or(doc).trim_end()
+    let ends = |&(at, _): &(usize, &str)| doc[at + 2..].starts_with(char::is_uppercase);
+    doc.match_indices(". ").find(ends).map_or(doc, |(at, _)| &doc[..=at])
 }
 
 /// Text for a table's cell.

@@ -210,3 +210,14 @@ fn what_is_watched_covers_documents_shaders_and_scene() {
     assert!(set.folders.iter().any(|f| f.ends_with("shaders")) && set.folders.iter().any(|f| f.ends_with("pipelines")));
     assert!(set.files.iter().any(|f| f.ends_with("square.ron")) && set.files.iter().any(|f| f.ends_with("square.obj")));
 }
+
+#[test]
+fn faults_of_text_and_meaning_are_told_together_without_a_gpu() {
+    let folder = library();
+    let text = PIPELINE.replace("node: \"test/fill\"", "node: \"test/fil\"").replace("size: Output", "sise: Output");
+    write(folder.path(), "pipelines/test.ron", &text);
+    let library = Library::new(Some(folder.path().to_owned()), Vec::new());
+    let faults = manylight_passes::Documents::load(library, Path::new("test")).expect_err("two faults").render();
+    assert!(faults.contains("unknown field `sise`") && faults.contains("there is no node `test/fil`"), "{faults}");
+    assert_eq!(faults.matches("error:").count(), 2, "{faults}");
+}

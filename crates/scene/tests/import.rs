@@ -106,6 +106,9 @@ fn files_without_a_triangle_are_errors_that_name_them() {
         let fault = load("bad.obj", &[("bad.obj", bytes)]).unwrap_err();
         assert_says(&fault, "", &["`bad.obj` holds no triangle"]);
     }
+    let fault = load("bad.obj", &[("bad.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")]).unwrap_err();
+    assert_says(&fault, "", &["`bad.obj` holds no triangle"]);
+    assert_says(&fault, "f 1 2 9", &["1 faces name vertices that do not exist"]);
     assert_says(&load::<&str>("gone.obj", &[]).unwrap_err(), "", &["cannot read `gone.obj`: no such file"]);
 }
 

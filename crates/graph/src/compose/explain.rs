@@ -99,7 +99,12 @@ impl Composition {
     ) -> Diagnostic {
         let mut labels = labels.into_iter();
         match labels.next() {
-            None => Diagnostic::error(message, Span::new(file, 0..0)),
+            None => {
+                // naga tells no place of what is wrong with an entry point's attributes.
+                let attribute = if message.contains("Workgroup size") { file.text.find("@workgroup_size") } else { None };
+                let range = attribute.map_or(0..0, |at| at..at + "@workgroup_size".len());
+                Diagnostic::error(message, Span::new(file, range))
+            }
             Some((range, text)) => {
                 let first = Diagnostic::error(message, place(range)).at(self.label(&text));
                 labels.fold(first, |fault, (range, text)| fault.and(place(range), self.label(&text)))

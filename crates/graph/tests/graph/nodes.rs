@@ -292,6 +292,7 @@ fn faults_of_imported_files_point_there_and_are_told_once() {
         1,
         &["the name `count2` cannot be shared between files", "shaders/common/cell.wgsl:1", "must not end in a digit"],
     );
+    one(WGSL, "@workgroup_size(64)", "@workgroup_size(100000)", &["Workgroup size is out of range", "paint.wgsl:19:10"]);
     one(COMMON, "struct Cell", "struc Cell", &["found \"struc\"", "cell.wgsl:1:1"]);
     one(COMMON, "fn area", "fnn area", &["found \"fnn\"", "cell.wgsl:6:1"]);
     one(COMMON, "fn area", "@compute fn area", &["shaders/common has no entry points", "cell.wgsl:6:1"]);

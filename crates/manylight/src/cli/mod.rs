@@ -139,7 +139,7 @@ pub struct RenderArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  manylight check\n  manylight check pipelines/acrsm.ron shaders/ism/splat.ron scenes/room.ron")]
 pub struct CheckArgs {
-    /// Pipelines, node declarations, scenes or sweeps (.ron); without any: everything in the library
+    /// Pipelines, node declarations or scenes (.ron); without any: everything in the library
     #[arg(value_name = "FILE")]
     pub files: Vec<PathBuf>,
 }

@@ -91,8 +91,11 @@ impl Watch<'_> {
         }
         let took = saved.elapsed().unwrap_or(report.took);
         note(&describe(&report, took));
-        if self.args.frames > 1 {
-            self.picture(self.args.frames - 1)?;
+        if self.args.frames > 1
+            && let Err(fault) = self.picture(self.args.frames - 1)
+        {
+            note(&fault.render());
+            return Ok(());
         }
         self.pictures += 1;
         Ok(())
@@ -118,10 +121,14 @@ fn describe(report: &ReloadReport, took: Duration) -> String {
     format!("{warnings}{}; {:.0} ms from save to picture", parts.join("; "), took.as_secs_f64() * 1e3)
 }
 
-/// When the newest of the files was saved; now, for files that are gone.
+/// A change is noticed sooner than this: a file saved earlier was moved here as it was.
+const SOON: Duration = Duration::from_secs(2);
+
+/// When the newest of the files was saved; now, for files that are gone or that were moved.
 fn saved_at(changed: &[PathBuf]) -> SystemTime {
     let modified = |path: &PathBuf| path.metadata().and_then(|m| m.modified()).ok();
-    changed.iter().filter_map(modified).max().unwrap_or_else(SystemTime::now)
+    let soon = |saved: &SystemTime| saved.elapsed().is_ok_and(|age| age < SOON);
+    changed.iter().filter_map(modified).max().filter(soon).unwrap_or_else(SystemTime::now)
 }
 
 fn shown(path: &std::path::Path) -> String {
@@ -134,4 +141,19 @@ fn watcher_files(renderer: &Renderer) -> String {
     let mut names: Vec<String> = set.folders.iter().map(|f| shown(f)).collect();
     names.push(format!("{} files", set.files.len()));
     names.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_was_moved_was_not_saved_when_it_was_written() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("old.ron");
+        let file = std::fs::File::create(&path).expect("created");
+        assert!(saved_at(std::slice::from_ref(&path)).elapsed().is_ok_and(|age| age < SOON));
+        file.set_modified(SystemTime::now() - Duration::from_secs(3600)).expect("set");
+        assert!(saved_at(&[path]).elapsed().is_ok_and(|age| age < SOON));
+    }
 }

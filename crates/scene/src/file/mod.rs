@@ -36,7 +36,14 @@ pub(crate) fn load(path: &Path, reader: &dyn FileReader) -> Result<Scene, Diagno
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     match extension.as_deref() {
         Some("obj") => {
-            let mesh = loader.mesh(path).map_err(|fault| Diagnostics(vec![fault]))?;
+            let mesh = match loader.mesh(path) {
+                Ok(mesh) => mesh,
+                // What was left out tells why nothing remained.
+                Err(fault) => {
+                    loader.out.0.push(fault);
+                    return Err(loader.out.sorted());
+                }
+            };
             loader.finish(stem.clone(), Document::default(), vec![(stem, mesh, Track::fixed(Pose::default()))])
         }
         Some("ron") | None => loader.scene(path, stem),
