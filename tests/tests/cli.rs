@@ -59,7 +59,9 @@ fn usage_errors_exit_with_2() {
 
 #[test]
 fn a_wrong_parameter_is_named_with_the_nearest_right_one() {
-    let set = |value: &str| manylight(&[&["render", "acrsm", "--scene", "cornell", "--set", value, "--out", "target/never.png"][..], &SMALL[..]].concat());
+    let set = |value: &str| {
+        manylight(&[&["render", "acrsm", "--scene", "cornell", "--set", value, "--out", "target/never.png"][..], &SMALL[..]].concat())
+    };
     set("clusers=64").expect(1).says(&["clusers", "clusters"]);
     set("clusters=5000").expect(1).says(&["clusters", "16", "512"]);
     set("clusters=many").expect(1).says(&["clusters"]);
@@ -114,14 +116,18 @@ fn documents_that_are_no_documents_are_refused() {
         let file = folder.path().join(name);
         fs::write(&file, bytes).expect("written");
         manylight(&["check", &file.to_string_lossy()]).expect(1).says(&[name]);
-        manylight(&[&["render", &file.to_string_lossy(), "--scene", "cornell", "--out", "x.png"][..], &SMALL[..]].concat()).expect(1).says(&[name]);
+        manylight(&[&["render", &file.to_string_lossy(), "--scene", "cornell", "--out", "x.png"][..], &SMALL[..]].concat())
+            .expect(1)
+            .says(&[name]);
     }
 }
 
 #[test]
 fn missing_files_are_named() {
     manylight(&[&["render", "acrsmm", "--scene", "cornell", "--out", "x.png"][..], &SMALL[..]].concat()).expect(1).says(&["acrsmm"]);
-    manylight(&[&["render", "acrsm", "--scene", "no/such/scene.ron", "--out", "x.png"][..], &SMALL[..]].concat()).expect(1).says(&["no/such/scene.ron"]);
+    manylight(&[&["render", "acrsm", "--scene", "no/such/scene.ron", "--out", "x.png"][..], &SMALL[..]].concat())
+        .expect(1)
+        .says(&["no/such/scene.ron"]);
     manylight(&["compare", "no.exr", "nor-this.exr"]).expect(1).says(&["no.exr"]);
 }
 
@@ -130,7 +136,9 @@ fn outputs_are_refused_before_anything_runs() {
     let render = |out: &str| manylight(&[&["render", "acrsm", "--scene", "cornell", "--out", out][..], &SMALL[..]].concat());
     render("/no/such/folder/x.png").expect(1).says(&["/no/such/folder"]);
     render("x.tiff").expect(2);
-    manylight(&[&["render", "acrsm", "--scene", "cornell", "--dump", "indirct=x.exr"][..], &SMALL[..]].concat()).expect(1).says(&["indirct", "indirect"]);
+    manylight(&[&["render", "acrsm", "--scene", "cornell", "--dump", "indirct=x.exr"][..], &SMALL[..]].concat())
+        .expect(1)
+        .says(&["indirct", "indirect"]);
 }
 
 #[test]
@@ -139,7 +147,11 @@ fn an_odd_size_renders() {
     for size in ["1x1", "37x5", "3x64"] {
         let out = folder.path().join(format!("{size}.exr"));
         let set = ["--set", "rsm_size=64", "--set", "point_count=2000"];
-        manylight(&[&["render", "acrsm", "--scene", "cornell", "--size", size, "--frames", "2", "--out", &out.to_string_lossy()][..], &set[..]].concat()).expect(0);
+        manylight(
+            &[&["render", "acrsm", "--scene", "cornell", "--size", size, "--frames", "2", "--out", &out.to_string_lossy()][..], &set[..]]
+                .concat(),
+        )
+        .expect(0);
         assert!(out.is_file());
     }
 }
@@ -148,7 +160,11 @@ fn an_odd_size_renders() {
 fn the_installed_program_needs_no_source_tree() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     manylight_in(folder.path(), &["check"]).expect(0);
-    manylight_in(folder.path(), &["render", "acrsm", "--scene", "cornell", "--size", "32x32", "--frames", "1", "--set", "rsm_size=64", "--out", "x.png"]).expect(0);
+    manylight_in(
+        folder.path(),
+        &["render", "acrsm", "--scene", "cornell", "--size", "32x32", "--frames", "1", "--set", "rsm_size=64", "--out", "x.png"],
+    )
+    .expect(0);
     assert!(folder.path().join("x.png").is_file());
 }
 
@@ -157,7 +173,21 @@ fn comparing_pictures_of_different_sizes_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for (name, size) in [("a.exr", "16x16"), ("b.exr", "8x8")] {
         let out = folder.path().join(name);
-        manylight(&["render", "acrsm", "--scene", "cornell", "--size", size, "--frames", "1", "--set", "rsm_size=32", "--out", &out.to_string_lossy()]).expect(0);
+        manylight(&[
+            "render",
+            "acrsm",
+            "--scene",
+            "cornell",
+            "--size",
+            size,
+            "--frames",
+            "1",
+            "--set",
+            "rsm_size=32",
+            "--out",
+            &out.to_string_lossy(),
+        ])
+        .expect(0);
     }
     manylight_in(folder.path(), &["compare", "a.exr", "b.exr"]).expect(1).says(&["16", "8"]);
     manylight_in(folder.path(), &["compare", "a.exr", "a.exr"]).expect(0);

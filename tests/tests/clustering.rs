@@ -9,7 +9,15 @@ const NO_CLUSTER: f32 = u32::MAX as f32;
 const ACTIVE: u64 = 1;
 
 fn job() -> Job {
-    Job::asset("cornell").small().frames(16).keep(&["clusters", "clusters_warped", "cluster_map", "rsm_flux", "rsm_normal", "rsm_distance", "importance_map"])
+    Job::asset("cornell").small().frames(16).keep(&[
+        "clusters",
+        "clusters_warped",
+        "cluster_map",
+        "rsm_flux",
+        "rsm_normal",
+        "rsm_distance",
+        "importance_map",
+    ])
 }
 
 fn texels(flux: &Image) -> impl Iterator<Item = (u32, u32, [f64; 3])> + '_ {
@@ -21,19 +29,14 @@ fn texels(flux: &Image) -> impl Iterator<Item = (u32, u32, [f64; 3])> + '_ {
     })
 }
 
+fn add(sum: [f64; 3], more: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| sum[i] + more[i])
+}
+
+/// Flux of the reflective shadow map and of the clusters, W.
 fn sums(renderer: &Renderer) -> ([f64; 3], [f64; 3]) {
-    let mut rsm = [0.0; 3];
-    for (_, _, flux) in texels(&read(renderer, "rsm_flux")) {
-        for i in 0..3 {
-            rsm[i] += flux[i];
-        }
-    }
-    let mut clusters = [0.0; 3];
-    for cluster in read_clusters(renderer, "clusters") {
-        for i in 0..3 {
-            clusters[i] += cluster.flux[i];
-        }
-    }
+    let rsm = texels(&read(renderer, "rsm_flux")).fold([0.0; 3], |sum, (_, _, flux)| add(sum, flux));
+    let clusters = read_clusters(renderer, "clusters").into_iter().fold([0.0; 3], |sum, cluster| add(sum, cluster.flux));
     (rsm, clusters)
 }
 
@@ -81,11 +84,12 @@ fn exact_mapping_is_the_nearest_cluster() {
     };
     let (w_x, w_n, w_rho) = (parameter("weight_position"), parameter("weight_normal"), parameter("weight_importance"));
     let state = renderer.scene().sample(0.0);
-    let diagonal = f64::from(state.bounds.diagonal());
+    let diagonal = state.bounds.diagonal();
     let view = state.light_view();
     let (map, normals, distances, importance) =
         (read(&renderer, "cluster_map"), read(&renderer, "rsm_normal"), read(&renderer, "rsm_distance"), read(&renderer, "importance_map"));
-    let clusters: Vec<(usize, Cluster)> = read_clusters(&renderer, "clusters_warped").into_iter().enumerate().filter(|(_, c)| c.state == ACTIVE).collect();
+    let clusters: Vec<(usize, Cluster)> =
+        read_clusters(&renderer, "clusters_warped").into_iter().enumerate().filter(|(_, c)| c.state == ACTIVE).collect();
     let mut wrong = 0;
     let mut lit = 0;
     for y in 0..map.height {
@@ -97,7 +101,9 @@ fn exact_mapping_is_the_nearest_cluster() {
             lit += 1;
             let ndc = [(f64::from(x) + 0.5) / f64::from(map.width) * 2.0 - 1.0, 1.0 - (f64::from(y) + 0.5) / f64::from(map.height) * 2.0];
             let mut direction: [f64; 3] = std::array::from_fn(|i| {
-                f64::from(view.forward[i]) + f64::from(view.right[i]) * ndc[0] * f64::from(view.tan_half_x) + f64::from(view.up[i]) * ndc[1] * f64::from(view.tan_half_y)
+                f64::from(view.forward[i])
+                    + f64::from(view.right[i]) * ndc[0] * f64::from(view.tan_half_x)
+                    + f64::from(view.up[i]) * ndc[1] * f64::from(view.tan_half_y)
             });
             let length = direction.iter().map(|v| v * v).sum::<f64>().sqrt();
             direction.iter_mut().for_each(|v| *v /= length);

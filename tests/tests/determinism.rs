@@ -42,7 +42,13 @@ fn no_resource_holds_a_number_that_is_none() {
         for lights in ["vpl", "val"] {
             for points in ["static", "dynamic"] {
                 let resources = ["direct", "indirect", "composed", "importance", "split_light", "rsm_flux", "gbuffer_normal"];
-                let renderer = Job::asset("glossy").small().set("visibility", visibility).set("lights", lights).set("points", points).keep(&resources).render();
+                let renderer = Job::asset("glossy")
+                    .small()
+                    .set("visibility", visibility)
+                    .set("lights", lights)
+                    .set("points", points)
+                    .keep(&resources)
+                    .render();
                 for resource in resources {
                     let image = read(&renderer, resource);
                     let bad = image.data.iter().filter(|v| !v.is_finite()).count();

@@ -18,10 +18,18 @@ struct Scene {
 
 /// The Cornell box is part of the repository; the other scenes run where the folder beside it is there.
 fn scenes() -> Vec<Scene> {
-    let mut scenes = vec![Scene { name: "cornell_blocks", file: root().join("assets/cornell.ron"), reference: root().join("tests/data/cornell_blocks") }];
+    let mut scenes = vec![Scene {
+        name: "cornell_blocks",
+        file: root().join("assets/cornell.ron"),
+        reference: root().join("tests/data/cornell_blocks"),
+    }];
     if let Some(shared) = shared() {
         for name in ["cornell_objects", "sponza"] {
-            scenes.push(Scene { name, file: shared.join("scenes").join(name).join(format!("{name}.ron")), reference: shared.join("reference").join(name) });
+            scenes.push(Scene {
+                name,
+                file: shared.join("scenes").join(name).join(format!("{name}.ron")),
+                reference: shared.join("reference").join(name),
+            });
         }
     } else {
         println!("cornell_objects and sponza were not run: ../shared is not there");
@@ -84,7 +92,12 @@ fn surfels_are_better_than_the_papers_splats() {
     let scene = &scenes()[0];
     let reference = exr(&scene.reference.join("onebounce.exr"));
     let default = error(&read(&Job::scene(&scene.file).keep(&["indirect"]).render(), "indirect"), &reference);
-    let paper = Job::scene(&scene.file).set("splat", "point").set("pull_push", 2).set("indirect.shadow_plane", false).set("indirect.shadow_bias", 0.03).set("pull_push.agreement", 1.0);
+    let paper = Job::scene(&scene.file)
+        .set("splat", "point")
+        .set("pull_push", 2)
+        .set("indirect.shadow_plane", false)
+        .set("indirect.shadow_bias", 0.03)
+        .set("pull_push.agreement", 1.0);
     let paper = error(&read(&paper.keep(&["indirect"]).render(), "indirect"), &reference);
     println!("surfels {:.1} %, squares {:.1} %", 100.0 * default.0, 100.0 * paper.0);
     assert!(default.0 < 0.75 * paper.0, "surfels {}, squares {}", default.0, paper.0);
@@ -112,7 +125,10 @@ fn direct_light_is_the_reference_away_from_shadow_edges() {
                 })
             })
         };
-        let pixels: Vec<_> = (0..image.height).flat_map(|y| (0..image.width).map(move |x| (x, y))).filter(|&(x, y)| reference_rgb(&reference, x, y)[0] > 0.0 && smooth(x, y)).collect();
+        let pixels: Vec<_> = (0..image.height)
+            .flat_map(|y| (0..image.width).map(move |x| (x, y)))
+            .filter(|&(x, y)| reference_rgb(&reference, x, y)[0] > 0.0 && smooth(x, y))
+            .collect();
         let mean_reference = mean(pixels.iter().flat_map(|&(x, y)| reference_rgb(&reference, x, y)));
         let rmse = mean(pixels.iter().flat_map(|&(x, y)| {
             let (a, b) = (rgb(&image, x, y), reference_rgb(&reference, x, y));
@@ -135,8 +151,10 @@ fn the_g_buffer_is_the_reference_except_at_silhouettes() {
         let layer = |name: &str| reference.layer(name).unwrap_or_else(|| panic!("a layer `{name}`, of {:?}", reference.layers()));
         let (albedo, normal) = (layer("albedo"), layer("normal"));
         let distance = reference.names.iter().position(|n| n == "distance").expect("a channel `distance`");
-        let reference_distance = |x: u32, y: u32| reference.data[(y as usize * reference.width + x as usize) * reference.channels() + distance];
-        let (mine_albedo, mine_normal, mine_depth) = (read(&renderer, "gbuffer_albedo"), read(&renderer, "gbuffer_normal"), read(&renderer, "gbuffer_depth"));
+        let reference_distance =
+            |x: u32, y: u32| reference.data[(y as usize * reference.width + x as usize) * reference.channels() + distance];
+        let (mine_albedo, mine_normal, mine_depth) =
+            (read(&renderer, "gbuffer_albedo"), read(&renderer, "gbuffer_normal"), read(&renderer, "gbuffer_depth"));
         let mut compared = 0_u32;
         let mut wrong = 0_u32;
         for y in 1..mine_depth.height - 1 {

@@ -71,7 +71,8 @@ pub fn manylight(arguments: &[&str]) -> Run {
 
 /// Runs the program in a folder.
 pub fn manylight_in(folder: &Path, arguments: &[&str]) -> Run {
-    let Output { status, stdout, stderr } = Command::new(program()).args(arguments).current_dir(folder).output().expect("the program starts");
+    let Output { status, stdout, stderr } =
+        Command::new(program()).args(arguments).current_dir(folder).output().expect("the program starts");
     Run {
         code: status.code(),
         stdout: String::from_utf8_lossy(&stdout).into_owned(),

@@ -146,8 +146,8 @@ fn node_name(heading: &str) -> Option<&str> {
 /// The overview: a table a stage.
 fn index(nodes: &BTreeMap<String, String>) -> String {
     let mut text = String::from(
-        "# Node reference\n\nEvery node that a pipeline can name, generated from the declarations by `cargo xtask docs`. The same text is printed by\n\
-         `manylight nodes NAME`.\n",
+        "# Node reference\n\nEvery node that a pipeline can name, generated from the declarations by `cargo xtask docs`. In a terminal\n\
+         `manylight nodes NAME` says the same.\n",
     );
     let mut last = "";
     for (name, page) in nodes {

@@ -26,6 +26,8 @@ pub struct ExprRef {
     pub kind: RefKind,
     /// The name.
     pub name: Spanned,
+    /// It divides: the greater it is, the smaller the result.
+    pub divides: bool,
 }
 
 /// What a name in an expression stands for.
@@ -89,8 +91,21 @@ pub(crate) fn eval(expr: &Expr, scope: &dyn Scope) -> Result<u64, EvalError> {
     }
 }
 
-const FORMS: &[&str] =
-    &["Param", "Width", "Height", "Elements", "Mul", "Add", "Min", "Max", "Div", "DivCeil", "NextPowerOfTwo", "OutputWidth", "OutputHeight"];
+const FORMS: &[&str] = &[
+    "Param",
+    "Width",
+    "Height",
+    "Elements",
+    "Mul",
+    "Add",
+    "Min",
+    "Max",
+    "Div",
+    "DivCeil",
+    "NextPowerOfTwo",
+    "OutputWidth",
+    "OutputHeight",
+];
 
 /// Reads an expression.
 pub(crate) fn read(reader: &mut Reader, tree: &Tree) -> Option<ExprAt> {
@@ -127,7 +142,7 @@ fn read_into(reader: &mut Reader, tree: &Tree, refs: &mut Vec<ExprRef>) -> Optio
                         _ => (RefKind::Buffer, Expr::Elements),
                     };
                     let expr = expr(name.text.clone());
-                    refs.push(ExprRef { kind, name });
+                    refs.push(ExprRef { kind, name, divides: false });
                     Some(expr)
                 }
                 "Mul" | "Add" | "Min" | "Max" => {
@@ -154,7 +169,10 @@ fn read_into(reader: &mut Reader, tree: &Tree, refs: &mut Vec<ExprRef>) -> Optio
                         reader.error(&tree.range, format!("`{text}` takes two expressions"), format!("write `{text}(a, b)`"));
                         return None;
                     };
-                    let (a, b) = (read_into(reader, a, refs), read_into(reader, b, refs));
+                    let a = read_into(reader, a, refs);
+                    let divisor = refs.len();
+                    let b = read_into(reader, b, refs);
+                    refs.iter_mut().skip(divisor).for_each(|r| r.divides = !r.divides);
                     let (a, b) = (Box::new(a?), Box::new(b?));
                     Some(if text == "Div" { Expr::Div(a, b) } else { Expr::DivCeil(a, b) })
                 }

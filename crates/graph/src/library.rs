@@ -86,7 +86,10 @@ impl Library {
     /// # Errors
     /// When it is missing or no text.
     pub fn read_file(path: &Path) -> Result<Arc<Source>, ReadError> {
-        if path.is_file() { read_text(path) } else { Err(ReadError::Missing(path.display().to_string())) }
+        if path.is_file() {
+            return read_text(path);
+        }
+        Err(no_file(path).unwrap_or_else(|| ReadError::Missing(path.display().to_string())))
     }
 
     /// Paths of the library that start with the folder `prefix` and end with `.extension`, sorted.
@@ -110,16 +113,19 @@ impl Library {
     /// Finds a document that the user named: a file on disk, a path of the library, or a name in `pipelines/` (`acrsm`, `acrsm.ron`).
     /// The second value is its path in the library, where it has one.
     pub(crate) fn find(&self, name: &Path) -> Result<(Arc<Source>, Option<String>), ReadError> {
-        match Self::read_file(name) {
-            Err(ReadError::Missing(_)) => {}
-            found => return found.map(|source| (source, self.inside(name))),
+        if name.is_file() {
+            return read_text(name).map(|source| (source, self.inside(name)));
         }
         let text = name.to_string_lossy().replace('\\', "/");
         let mut tries = vec![normal(&text), join("pipelines", &text)];
         if name.extension().is_none() {
             tries.push(format!("{}.ron", join("pipelines", &text)));
         }
-        self.first_of(tries, &text)
+        // A folder may have the name of a pipeline: it is only told of when there is none.
+        self.first_of(tries, &text).map_err(|error| match error {
+            ReadError::Missing(_) => no_file(name).unwrap_or(error),
+            ReadError::Unreadable { .. } => error,
+        })
     }
 
     /// Finds a document that another one names: relative to it, then in `pipelines/`.
@@ -131,9 +137,8 @@ impl Library {
     ) -> Result<(Arc<Source>, Option<String>), ReadError> {
         if let Some(folder) = from.path.as_ref().and_then(|p| p.parent()) {
             let file = PathBuf::from(normal(&folder.join(name).to_string_lossy().replace('\\', "/")));
-            match Self::read_file(&file) {
-                Err(ReadError::Missing(_)) => {}
-                found => return found.map(|source| (source, self.inside(&file))),
+            if file.is_file() {
+                return read_text(&file).map(|source| (source, self.inside(&file)));
             }
         }
         let beside = from_path.map(|path| join(parent(path), name));
@@ -154,6 +159,10 @@ impl Library {
     pub(crate) fn suggest_document(&self, name: &str) -> String {
         let known = self.list("pipelines", "ron");
         let known = known.iter().filter_map(|k| k.strip_prefix("pipelines/"));
+        let file = format!("{name}.ron");
+        if known.clone().any(|k| k == file) {
+            return format!("did you mean `{file}`?");
+        }
         if name.ends_with(".ron") { suggest(name, known) } else { suggest(name, known.map(|k| k.trim_end_matches(".ron"))) }
     }
 
@@ -163,6 +172,13 @@ impl Library {
         let file = file.canonicalize().ok()?;
         Some(file.strip_prefix(root).ok()?.to_string_lossy().replace('\\', "/"))
     }
+}
+
+/// Why something that is there is no file; `None` when nothing is there.
+fn no_file(path: &Path) -> Option<ReadError> {
+    let meta = fs::metadata(path).ok()?;
+    let reason = if meta.is_dir() { "it is a folder" } else { "it is no ordinary file" };
+    Some(ReadError::Unreadable { name: shown_name(path), reason: reason.to_owned() })
 }
 
 /// The folder of a path with `/`.

@@ -149,10 +149,19 @@ pub(crate) fn read_literal(reader: &mut Reader, tree: &Tree) -> Option<Literal> 
 
 const KINDS: &[&str] = &["Int", "Float", "Bool", "Choice"];
 
+/// No document has more parameters.
+const MOST_PARAMS: usize = 1000;
+
 /// Reads `params: {…}`.
 pub(crate) fn read_params(reader: &mut Reader, tree: &Tree) -> IndexMap<String, Param> {
     let mut params = IndexMap::new();
-    for (name, tree) in reader.map(tree, "parameters") {
+    let given = reader.map(tree, "parameters");
+    if given.len() > MOST_PARAMS {
+        // Checks try every value of every parameter.
+        reader.error(&tree.range, format!("there are {} parameters, more than the {MOST_PARAMS} allowed", given.len()), "");
+        return params;
+    }
+    for (name, tree) in given {
         if let Some(param) = read_param(reader, &name, tree) {
             params.insert(name.text, param);
         }

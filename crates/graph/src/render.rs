@@ -13,6 +13,8 @@ use crate::diagnostics::{Diagnostic, Diagnostics, Severity, Source, Span};
 
 /// A line longer than this is named but not printed.
 const LONGEST_SHOWN_LINE: usize = 400;
+/// More faults than this are counted but not printed.
+const MOST_SHOWN: usize = 200;
 
 impl Source {
     /// Line and column (both from 1, columns in characters) of a byte offset.
@@ -71,7 +73,7 @@ impl Diagnostics {
         let mut ids: HashMap<*const Source, usize> = HashMap::new();
         let config = Config { chars: Chars::ascii(), ..Config::default() };
         let mut text = String::new();
-        for diagnostic in &self.0 {
+        for diagnostic in self.0.iter().take(MOST_SHOWN) {
             if diagnostic.labels.iter().any(|label| longest_line(&label.span) > LONGEST_SHOWN_LINE) {
                 render_without_snippet(&mut text, diagnostic);
                 continue;
@@ -98,6 +100,9 @@ impl Diagnostics {
             if !text.ends_with("\n\n") {
                 text.push('\n');
             }
+        }
+        if let Some(more) = self.0.len().checked_sub(MOST_SHOWN).filter(|more| *more > 0) {
+            let _ = writeln!(text, "and {more} more, which are not shown");
         }
         while text.ends_with("\n\n") {
             text.pop();

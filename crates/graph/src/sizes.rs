@@ -131,7 +131,10 @@ impl<'a, 'p> Sizes<'a, 'p> {
                 let height = self.eval(name, "height", h, out);
                 let (width, height) = (width?, height?);
                 let place = if (1..=LARGEST_SIDE).contains(&width) { &h.span } else { &w.span };
-                let refs = w.refs.iter().chain(&h.refs).cloned().collect();
+                // Of a side that is as it should be, nothing need change.
+                let wrong = |side: u64| !(1..=LARGEST_SIDE).contains(&side);
+                let refs =
+                    [(width, w), (height, h)].into_iter().filter(|(side, _)| wrong(*side)).flat_map(|(_, e)| e.refs.clone()).collect();
                 (width, height, place, refs)
             }
             Size::Like(other) => {
@@ -240,15 +243,21 @@ impl<'a, 'p> Sizes<'a, 'p> {
 
     /// Names the parameters that decide.
     fn remedy(&self, verb: &str, noun: &str, refs: &[expr::ExprRef]) -> String {
-        let mut params: Vec<&str> = refs.iter().filter(|r| r.kind == RefKind::Param).map(|r| r.name.text.as_str()).collect();
-        params.sort_unstable();
-        params.dedup();
-        if params.is_empty() {
-            return format!("{verb} {noun}");
+        let shown = |divides: bool| -> String {
+            let mut params: Vec<&str> =
+                refs.iter().filter(|r| r.kind == RefKind::Param && r.divides == divides).map(|r| r.name.text.as_str()).collect();
+            params.sort_unstable();
+            params.dedup();
+            let value = |name: &str| self.values.get(name).map(Value::to_string).unwrap_or_default();
+            params.iter().map(|p| format!("`{p}` (now {})", value(p))).collect::<Vec<_>>().join(" or ")
+        };
+        let opposite = if verb == "lower" { "raise" } else { "lower" };
+        match (shown(false), shown(true)) {
+            (same, other) if same.is_empty() && other.is_empty() => format!("{verb} {noun}"),
+            (same, other) if other.is_empty() => format!("{verb} the parameter {same}"),
+            (same, other) if same.is_empty() => format!("{opposite} the parameter {other}"),
+            (same, other) => format!("{verb} the parameter {same}, or {opposite} {other}"),
         }
-        let shown: Vec<String> =
-            params.iter().map(|p| format!("`{p}` (now {})", self.values.get(p).map(Value::to_string).unwrap_or_default())).collect();
-        format!("{verb} the parameter {}", shown.join(" or "))
     }
 }
 

@@ -31,7 +31,8 @@ fn main() -> Outcome<()> {
     let gpu = Gpu::new(&GpuOptions::default())?;
     println!("{} ({})", gpu.adapter_info().name, gpu.kind());
 
-    let settings = |size, rsm: u32| Settings { size: (size, size), set: vec![("rsm_size".to_owned(), rsm.to_string())], ..Settings::default() };
+    let settings =
+        |size, rsm: u32| Settings { size: (size, size), set: vec![("rsm_size".to_owned(), rsm.to_string())], ..Settings::default() };
     let documents = Documents::load(library(), Path::new("acrsm"))?;
     let input = plan_input(&settings(256, 256), &scene.load()?);
     let mut plans = Vec::new();

@@ -6,12 +6,16 @@ use petgraph::graph::{EdgeIndex, NodeIndex};
 
 use super::{Activity, Planner, Read};
 use crate::{
+    condition::ConditionKind,
     diagnostics::{Diagnostic, Span},
     order::{self, Dag},
     registry::Direction,
     render::suggest,
     resolve::Wire,
 };
+
+/// So many nodes that are off are all told of.
+const MOST_TOLD: usize = 3;
 
 impl<'a> Planner<'a, '_> {
     pub(super) fn activity(&mut self) -> Activity<'a> {
@@ -178,16 +182,38 @@ impl<'a> Planner<'a, '_> {
     }
 
     pub(super) fn producers_off(&self, resource: &str, activity: &Activity<'a>) -> String {
-        let mut reasons = Vec::new();
-        for (index, node) in self.linked.nodes.iter().enumerate() {
-            let writes = node.ports().any(|(_, port, wire)| {
-                port.direction == Direction::Output && matches!(wire, Wire::Resource { name, .. } if name == resource)
-            });
-            if let (true, Some(why)) = (writes, &activity.off[index]) {
-                reasons.push(format!("node `{}`, which writes it, is off: {why}", node.usage.id.text));
-            }
-        }
+        let reasons: Vec<String> = self
+            .nearly_on(resource, activity)
+            .into_iter()
+            .filter_map(|index| {
+                let why = activity.off[index].as_ref()?;
+                Some(format!("node `{}`, which writes it, is off: {why}", self.linked.nodes[index].usage.id.text))
+            })
+            .collect();
         if reasons.is_empty() { String::new() } else { format!(": {}", reasons.join("; ")) }
+    }
+
+    /// Nodes that would write a resource but are off; of many, where some fulfil more clauses of their conditions than others, only those:
+    /// of seven views, the one that was chosen.
+    fn nearly_on(&self, resource: &str, activity: &Activity<'a>) -> Vec<usize> {
+        let get = |name: &str| self.values.get(name).cloned();
+        let writes = |index: &usize| {
+            self.linked.nodes[*index].ports().any(|(_, port, wire)| {
+                port.direction == Direction::Output && matches!(wire, Wire::Resource { name, .. } if name == resource)
+            })
+        };
+        let fulfilled = |index: usize| -> usize {
+            match self.linked.nodes[index].usage.when.as_ref().map(|when| &when.kind) {
+                Some(ConditionKind::All(clauses)) => clauses.iter().filter(|c| c.eval(&get, &self.input.features).holds).count(),
+                _ => 0,
+            }
+        };
+        let off: Vec<(usize, usize)> = (0..self.linked.nodes.len())
+            .filter(|index| activity.off[*index].is_some() && writes(index))
+            .map(|index| (index, fulfilled(index)))
+            .collect();
+        let most = if off.len() > MOST_TOLD { off.iter().map(|(_, count)| *count).max().unwrap_or(0) } else { 0 };
+        off.into_iter().filter(|(_, count)| *count >= most).map(|(index, _)| index).collect()
     }
 
     pub(super) fn unproduced(&mut self, resource: &str, span: &Span, reader: &str, activity: &Activity<'a>) {
@@ -195,18 +221,17 @@ impl<'a> Planner<'a, '_> {
             return;
         }
         let why = self.producers_off(resource, activity);
-        let producers = self.linked.nodes.iter().filter(|node| {
-            node.usage.when.is_some()
-                && node
-                    .ports()
-                    .any(|(_, p, w)| p.direction == Direction::Output && matches!(w, Wire::Resource { name, .. } if name == resource))
-        });
+        let producers = self.nearly_on(resource, activity);
         let mut fault = Diagnostic::error(format!("`{resource}` is read, but not written in this frame{why}"), span.clone()).at(reader);
-        for node in producers {
+        for node in producers.iter().map(|index| &self.linked.nodes[*index]) {
             if let Some(when) = &node.usage.when {
                 fault = fault.and(when.span.clone(), format!("the condition of `{}`", node.usage.id.text));
             }
         }
-        self.out.push(fault.help("give the reader the same condition, or let another node write it otherwise"));
+        self.out.push(fault.help(if producers.is_empty() {
+            "let a node write it"
+        } else {
+            "set the parameters so that it is written, give the reader the same condition, or let another node write it otherwise"
+        }));
     }
 }

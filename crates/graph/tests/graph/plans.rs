@@ -275,9 +275,23 @@ fn quotients_round_down_or_up() {
         let plan = try_plan(&files, &input()).unwrap();
         match plan.resources[plan.resource("cells").unwrap()].desc {
             ResourceDesc::Buffer { count, .. } => count,
-            ResourceDesc::Texture { .. } => 0,
+            _ => 0,
         }
     };
     assert_eq!((count("Div(Param(\"count\"), 96)"), count("DivCeil(Param(\"count\"), 96)")), (1, 2));
     assert_eq!((count("Div(192, 96)"), count("DivCeil(192, 96)")), (2, 2));
+}
+
+#[test]
+fn of_many_views_the_one_that_was_chosen_is_told_of() {
+    let choice = "\"view\": Choice(options: [\"a\", \"b\", \"c\", \"d\"], default: \"a\", doc: \"what to show\"),";
+    let files = with(FILE, "    params: {", &format!("    params: {{ {choice}"));
+    let show =
+        "(id: \"show\", node: \"post/blur\", in: {\"source\": \"blurred\"}, out: {\"blurred\": \"result\"}, params: {\"radius\": 1}),";
+    let view = |id: &str, when: &str| show.replace("\"show\"", &format!("\"{id}\"")).replace("1})", &format!("1}}, when: {when})"));
+    let views = ["a", "b", "c"].map(|id| view(id, &format!("Is(\"view\", \"{id}\")"))).concat();
+    let files = edit(files, FILE, show, &(views + &view("d", "All([Is(\"view\", \"d\"), IsOn(\"blur\")])")));
+    let input = PlanInput { set: vec![("view".into(), "d".into()), ("blur".into(), "false".into())], ..input() };
+    let faults = try_plan(&files, &input).unwrap_err().render();
+    assert_faults(&faults, 1, &["`result` is read, but not written in this frame: node `d`, which writes it, is off: `blur` is off\n"]);
 }

@@ -19,6 +19,11 @@ fn text(text: &str, parts: &[&str]) {
     assert_faults(&check_faults(&add(files(), FILE, text)), 1, parts);
 }
 
+#[track_caller]
+fn text_of(text: &str, shown: usize, parts: &[&str]) {
+    assert_faults(&check_faults(&add(files(), FILE, text)), shown, parts);
+}
+
 #[test]
 fn syntax() {
     one(
@@ -45,6 +50,13 @@ fn odd_files() {
     text("3", &["expected `Pipeline(…)` or `Stage(…)`, found a number"]);
     text("Stage(doc: \"x\")", &["a stage is no pipeline"]);
     assert_faults(&check_faults(&add(files(), FILE, "Pipeline()")), 2, &["missing field `doc`", "missing field `presents`"]);
+    let params: String = (0..1500).map(|i| format!("\"p{i}\": Bool(default: true, doc: \"\"),")).collect();
+    text(
+        &format!("Pipeline(doc: \"x\", presents: \"\", params: {{{params}}})"),
+        &["there are 1500 parameters, more than the 1000 allowed"],
+    );
+    let nodes = "(id: \"a\", node: \"b\"),\n".repeat(50_000);
+    text_of(&format!("Pipeline(doc: \"x\", presents: \"\", nodes: [{nodes}])"), 200, &["and 49800 more, which are not shown"]);
     text(&"[".repeat(1_000_000), &["brackets are nested more than 96 deep"]);
     text(&"Not(".repeat(100_000), &["brackets are nested more than 96 deep"]);
     text(&format!("{}\u{0}\u{1}", "x".repeat(100_000)), &["error"]);
@@ -67,7 +79,8 @@ fn files_that_cannot_be_read() {
     assert_faults(&fault(&path("binary.ron")), 1, &["binary.ron", "it is no UTF-8 text (byte 2, line 1)"]);
     assert_faults(&fault(&path("huge.ron")), 1, &["it has 5242880 bytes"]);
     assert_faults(&fault(Path::new("tst")), 1, &["there is no file `tst`", "did you mean `test`?"]);
-    assert_faults(&fault(folder.path()), 1, &["there is no file"]);
+    assert_faults(&fault(folder.path()), 1, &["cannot read", "it is a folder"]);
+    assert_faults(&fault(&path("gone.ron")), 1, &["there is no file"]);
 }
 
 #[test]
