@@ -5,6 +5,7 @@ mod cli;
 mod clustering;
 mod determinism;
 mod moving_light;
+mod path_tracer;
 mod reference;
 mod renders;
 mod support;

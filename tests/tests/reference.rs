@@ -53,7 +53,7 @@ fn rgb(image: &Image, x: u32, y: u32) -> [f64; 3] {
 }
 
 /// EXR files list channels by name: blue first.
-fn reference_rgb(picture: &Picture, x: u32, y: u32) -> [f64; 3] {
+pub fn reference_rgb(picture: &Picture, x: u32, y: u32) -> [f64; 3] {
     let at = (y as usize * picture.width + x as usize) * picture.channels();
     let channel = |names: [&str; 2]| picture.names.iter().position(|n| names.contains(&n.as_str())).expect("a channel");
     [["R", "X"], ["G", "Y"], ["B", "Z"]].map(|names| f64::from(picture.data[at + channel(names)]))

@@ -23,6 +23,7 @@
 //! - [`host`]: the nodes that are written in Rust.
 //! - [`scene_source`]: where a scene is loaded from.
 
+mod bvh;
 pub mod documents;
 pub mod externals;
 pub mod host;

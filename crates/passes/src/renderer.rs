@@ -102,11 +102,12 @@ struct LoadedScene {
 
 impl LoadedScene {
     fn new(source: SceneSource, scene: Scene, seed: u32) -> Self {
-        Self { source, host: HostScene { scene: Arc::new(scene), seed }, upload: SceneUpload::new(), externals: Externals::new() }
+        Self { source, host: HostScene { scene: Arc::new(scene), seed, time: 0.0 }, upload: SceneUpload::new(), externals: Externals::new() }
     }
 
     fn upload(&mut self, gpu: &Gpu, size: (u32, u32), frame: &gpu_data::Frame) -> Result<(), Fault> {
-        let state = self.host.scene.sample(f64::from(frame.time));
+        self.host.time = f64::from(frame.time);
+        let state = self.host.scene.sample(self.host.time);
         let aspect = size.0 as f32 / size.1 as f32;
         self.upload.upload(gpu, &mut self.externals, &self.host.scene, &state, frame, aspect)
     }

@@ -6,6 +6,8 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Mat4, Vec3, Vec4};
 use manylight_graph::shader::{Layout, Member, MemberKind, Scalar};
 
+use crate::bvh::{BvhNode, BvhTriangle};
+
 /// A pinhole camera, or a light seen as one. World space, right-handed; all vectors have unit length.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -268,6 +270,8 @@ macro_rules! layout {
 /// The names and layouts of all structures of this module that shaders read.
 pub fn layouts() -> Vec<(&'static str, Layout)> {
     vec![
+        layout!(BvhNode { low, first, high, count }),
+        layout!(BvhTriangle { a, index, ab, material, ac, object }),
         layout!(View { clip_from_world, origin, near, right, tan_half_x, up, tan_half_y, forward, far }),
         layout!(SpotLight { position, beam_rad, direction, cutoff_rad, intensity, falloff }),
         layout!(Frame { index, seed, time, delta_time }),

@@ -21,6 +21,7 @@
 //! - [`gpu_data`]: the structures that shaders read, and their layouts.
 //! - [`files`]: reading from disk, from the program itself, or from anywhere else.
 //! - [`bounds`]: axis-aligned boxes.
+//! - [`bvh`]: a hierarchy of boxes over all triangles, for shaders that trace rays.
 //!
 //! # Scene files
 //!
@@ -50,6 +51,7 @@
 //! `repeat` in the same way. Values are mixed linearly from key to key, rotations on the shortest arc.
 
 pub mod bounds;
+pub mod bvh;
 mod file;
 pub mod files;
 mod fit;
