@@ -111,9 +111,9 @@ fn dispatches_beyond_the_limits_name_the_node() {
 #[test]
 fn features_that_are_missing_are_named() {
     let mut world = world();
-    world.write("shaders/test/draw.ron", &DRAW.replace("steps:", r#"requires: ["TEXTURE_FORMAT_P010"], steps:"#));
+    world.write("shaders/test/draw.ron", &DRAW.replace("steps:", r#"requires: ["EXPERIMENTAL_COOPERATIVE_MATRIX"], steps:"#));
     let error = world.try_build(None).unwrap_err().to_string();
-    for part in ["`paint`", "TEXTURE_FORMAT_P010", world.gpu.adapter_info().name.as_str()] {
+    for part in ["`paint`", "EXPERIMENTAL_COOPERATIVE_MATRIX", world.gpu.adapter_info().name.as_str()] {
         assert!(error.contains(part), "{error}");
     }
 }

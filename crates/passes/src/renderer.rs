@@ -102,7 +102,12 @@ struct LoadedScene {
 
 impl LoadedScene {
     fn new(source: SceneSource, scene: Scene, seed: u32) -> Self {
-        Self { source, host: HostScene { scene: Arc::new(scene), seed, time: 0.0 }, upload: SceneUpload::new(), externals: Externals::new() }
+        Self {
+            source,
+            host: HostScene { scene: Arc::new(scene), seed, time: 0.0 },
+            upload: SceneUpload::new(),
+            externals: Externals::new(),
+        }
     }
 
     fn upload(&mut self, gpu: &Gpu, size: (u32, u32), frame: &gpu_data::Frame) -> Result<(), Fault> {

@@ -56,9 +56,8 @@ impl Bvh {
     /// Builds the hierarchy over the scene's triangles where `objects` puts them. About 0.1 s for 10⁵ triangles.
     pub fn build(scene: &Scene, objects: &[Object]) -> Self {
         let vertices = scene.gpu_vertices();
-        let place = |vertex: u32, object: u32| {
-            objects[object as usize].world_from_object.transform_point3(vertices[vertex as usize].position)
-        };
+        let place =
+            |vertex: u32, object: u32| objects[object as usize].world_from_object.transform_point3(vertices[vertex as usize].position);
         let mut corners = Vec::new();
         let mut sources = Vec::new();
         for (index, t) in scene.gpu_triangles().into_iter().enumerate() {
@@ -92,11 +91,8 @@ impl Bvh {
             high: n.aabb.max.into(),
             count: n.prim_count,
         };
-        let mut bvh = Self {
-            nodes: bvh.nodes.iter().map(node).collect(),
-            triangles: bvh.primitive_indices.iter().map(triangle).collect(),
-            depth: 0,
-        };
+        let mut bvh =
+            Self { nodes: bvh.nodes.iter().map(node).collect(), triangles: bvh.primitive_indices.iter().map(triangle).collect(), depth: 0 };
         bvh.depth = bvh.measure();
         bvh
     }

@@ -48,6 +48,9 @@ fn layouts_are_those_of_the_wgsl() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shaders/common");
     let mut wgsl = wgsl_structs(&std::fs::read_to_string(format!("{folder}/scene.wgsl")).unwrap());
     wgsl.extend(wgsl_structs(&std::fs::read_to_string(format!("{folder}/points.wgsl")).unwrap()));
+    // Besides rays and hits, which only shaders make.
+    let hierarchy = wgsl_structs(&std::fs::read_to_string(format!("{folder}/bvh.wgsl")).unwrap());
+    wgsl.extend(hierarchy.into_iter().filter(|(name, ..)| name.starts_with("Bvh")));
     let rust = layouts();
     assert_eq!(rust.len(), wgsl.len());
     for (name, members, size) in wgsl {

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod assets;
+mod bvh;
 mod gpu_data;
 mod import;
 mod memory;
