@@ -95,13 +95,13 @@ fn the_path_tracer_agrees_with_another_renderer() {
     let data = root().join("tests/data/cornell_blocks");
     let cornell = root().join("assets/cornell.ron");
     let mut cases = vec![
-        case(cornell.clone(), data.clone(), DIRECT, 64),
-        case(cornell.clone(), data.clone(), ONE_BOUNCE, 96),
-        case(cornell, data, FULL, 96),
+        case(cornell.clone(), data.clone(), DIRECT, 48),
+        case(cornell.clone(), data.clone(), ONE_BOUNCE, 64),
+        case(cornell, data, FULL, 64),
     ];
     if let Some(shared) = shared() {
         let scene = |name: &str| (shared.join("scenes").join(name).join(format!("{name}.ron")), shared.join("reference").join(name));
-        for (name, component, frames) in [("cornell_objects", ONE_BOUNCE, 48), ("sponza", DIRECT, 48), ("sponza", ONE_BOUNCE, 48)] {
+        for (name, component, frames) in [("cornell_objects", ONE_BOUNCE, 32), ("sponza", DIRECT, 32), ("sponza", ONE_BOUNCE, 32)] {
             let (file, reference) = scene(name);
             cases.push(case(file, reference, component, frames));
         }
