@@ -6,9 +6,10 @@
 #import common::scene::{Vertex, Triangle, Object, SceneInfo, Frame}
 #import common::points::{ScenePoint, WORLD_SPACE}
 #import common::dispatch::linear_index
-#import common::random::{halton_23, radical_inverse_2, hash}
+#import common::random::{radical_inverse_2, radical_inverse_3, hash3, unit_float}
 
 struct Params {
+    clusters: u32,
     f_min: u32,
     f_max: u32,
 }
@@ -164,8 +165,11 @@ fn emit(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
     if i >= count || total <= 0.0 {
         return;
     }
-    // The radical inverse spreads any run of points, and so any residue class of them, evenly over the whole weight.
-    let at = min(fract(radical_inverse_2(i) + f32(hash(frame.seed) >> 8u) * 0x1p-24), 0x1.fffffep-1) * total;
+    // Point i goes to map i mod k: each map's points are a low-discrepancy sequence over the whole weight, with a shift of its own.
+    // (A sequence over i itself would put all points of a map side by side where k is a power of its base.)
+    let map = i % params.clusters;
+    let nth = i / params.clusters;
+    let at = min(fract(radical_inverse_2(nth) + unit_float(hash3(map, frame.seed, 1u))), 0x1.fffffep-1) * total;
     var low = 0u;
     var high = triangles - 1u;
     while low < high {
@@ -182,9 +186,8 @@ fn emit(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
         previous = offset_up_to(low - 1u);
     }
     let weight = offset_up_to(low) - previous;
-    // Uniform in the triangle: a square folded over its diagonal.
-    var uv = halton_23(i + 1u);
-    uv = fract(uv + vec2f(0.5, 0.25) * f32(hash(low) >> 8u) * 0x1p-24);
+    // Uniform in the triangle: a square folded over its diagonal. What is left of the choice of the triangle is uniform as well.
+    var uv = vec2f(saturate((at - previous) / weight), fract(radical_inverse_3(nth) + unit_float(hash3(map, frame.seed, 2u))));
     if uv.x + uv.y > 1.0 {
         uv = 1.0 - uv;
     }

@@ -86,6 +86,19 @@ fn one_bounce_light_is_near_the_reference() {
     }
 }
 
+/// Points made each frame cast the shadows that static ones cast: every map gets points of the whole scene, whatever the number of maps.
+#[test]
+fn dynamic_points_shadow_as_static_ones() {
+    let scene = &scenes()[0];
+    let reference = exr(&scene.reference.join("onebounce.exr"));
+    for clusters in [64, 100] {
+        let job = Job::scene(&scene.file).set("rsm_size", 256).set("points", "dynamic").set("clusters", clusters);
+        let (mae, energy) = error(&read(&job.keep(&["indirect"]).render(), "indirect"), &reference);
+        println!("{clusters} lights: mean absolute error {:.2} %, energy {energy:.3}", 100.0 * mae);
+        assert!(mae <= 0.12 && energy <= 1.0, "{clusters} lights: mean absolute error {:.2} %, energy {energy}", 100.0 * mae);
+    }
+}
+
 /// Surfels with the receiver's plane against the papers' squares with a constant comparison.
 #[test]
 fn surfels_are_better_than_the_papers_splats() {
