@@ -36,3 +36,14 @@ fn spot_falloff(light: SpotLight, direction: vec3f) -> f32 {
 fn disk_form_factor(cos_receiver: f32, cos_emitter: f32, d2: f32, area: f32) -> f32 {
     return max(cos_receiver, 0.0) * max(cos_emitter, 0.0) / max(PI * d2 + area, 1e-30);
 }
+
+// Lambert and Blinn between two unit directions away from the surface, 1/sr. The lobe is normalised so that the energy it reflects
+// does not depend on the exponent.
+fn lambert_blinn(albedo: vec3f, specular: vec3f, shininess: f32, normal: vec3f, to_light: vec3f, to_viewer: vec3f) -> vec3f {
+    var f = albedo / PI;
+    if max_component(specular) > 0.0 {
+        let half = normalize(to_light + to_viewer);
+        f += specular * ((shininess + 8.0) / (8.0 * PI) * pow(max(dot(normal, half), 0.0), max(shininess, 1.0)));
+    }
+    return f;
+}

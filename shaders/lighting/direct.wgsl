@@ -3,7 +3,7 @@
 #import common::scene::{View, SpotLight}
 #import common::view::{pixel_direction, view_uv}
 #import common::octahedral::unpack_unit
-#import common::radiometry::{PI, spot_falloff, max_component}
+#import common::radiometry::{spot_falloff, max_component, lambert_blinn}
 #import common::shadow::plane_reciprocal
 
 struct Params {
@@ -70,12 +70,8 @@ fn light(@builtin(global_invocation_id) id: vec3u) {
         if cosine > 0.0 && max_component(intensity) > 0.0 {
             visible = shadow(position, normal);
             let specular = textureLoad(gbuffer_specular, id.xy, 0);
-            var brdf = textureLoad(gbuffer_albedo, id.xy, 0).rgb / PI;
-            if max_component(specular.rgb) > 0.0 {
-                let half = normalize(l - direction);
-                // Normalised so that the reflected energy does not depend on the exponent.
-                brdf += specular.rgb * ((specular.a + 8.0) / (8.0 * PI) * pow(max(dot(normal, half), 0.0), max(specular.a, 1.0)));
-            }
+            let albedo = textureLoad(gbuffer_albedo, id.xy, 0).rgb;
+            let brdf = lambert_blinn(albedo, specular.rgb, specular.a, normal, l, -direction);
             radiance = brdf * intensity * (cosine / d2 * visible); // methods: radiometry
         }
     }

@@ -7,7 +7,7 @@
 #import common::scene::{Frame, View, SpotLight, SceneInfo, Vertex, Triangle, Object, Material, NO_TEXTURE}
 #import common::bvh::{BvhNode, BvhTriangle, Ray, TriangleHit, BVH_STACK, MISSED, make_ray, enter_box, hit_triangle}
 #import common::view::ray_direction
-#import common::radiometry::{PI, spot_falloff, max_component}
+#import common::radiometry::{PI, spot_falloff, max_component, lambert_blinn}
 #import common::random::{hash, hash3, unit_float}
 #import common::paraboloid::basis
 
@@ -142,12 +142,7 @@ fn surface_at(ray: Ray, hit: Hit) -> Surface {
 
 // 1/sr
 fn brdf(s: Surface, towards: vec3f) -> vec3f {
-    var f = s.albedo / PI;
-    if max_component(s.specular) > 0.0 {
-        let half = normalize(towards + s.to_viewer);
-        f += s.specular * ((s.shininess + 8.0) / (8.0 * PI) * pow(max(dot(s.normal, half), 0.0), max(s.shininess, 1.0)));
-    }
-    return f;
+    return lambert_blinn(s.albedo, s.specular, s.shininess, s.normal, towards, s.to_viewer);
 }
 
 fn lift(s: Surface) -> vec3f {

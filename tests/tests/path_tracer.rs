@@ -2,11 +2,8 @@
 
 use std::path::PathBuf;
 
-use manylight::files::{Picture, read_picture};
-use manylight_gpu::Image;
-
 use crate::{
-    reference::reference_rgb,
+    reference::{exr, reference_rgb, rgb},
     renders::{Job, read},
     support::{root, shared},
 };
@@ -26,10 +23,6 @@ fn case(scene: PathBuf, reference: PathBuf, component: (&'static str, &'static s
 const DIRECT: (&str, &str) = ("direct", "direct");
 const ONE_BOUNCE: (&str, &str) = ("one_bounce", "onebounce");
 const FULL: (&str, &str) = ("full", "full");
-
-fn exr(path: PathBuf) -> Picture {
-    read_picture(&path).unwrap_or_else(|e| panic!("{e}"))
-}
 
 /// Blocks of this many pixels a side are compared: the mean over a block is near to normally distributed also where single paths are
 /// rarely bright, which a z-test needs.
@@ -57,11 +50,6 @@ fn blocks(size: u32, value: impl Fn(u32, u32) -> [f64; 3], error: impl Fn(u32, u
     blocks
 }
 
-fn rgb(image: &Image, x: u32, y: u32) -> [f64; 3] {
-    let p = image.pixel(x, y);
-    [f64::from(p[0]), f64::from(p[1]), f64::from(p[2])]
-}
-
 /// Share of blocks and channels whose difference is beyond four standard errors (normal: 6 in 100,000), and the ratio of the means.
 /// `scale` multiplies the tracer's radiance: 1 but for the test of the test.
 fn disagreement(case: &Case, scale: f64) -> (f64, f64) {
@@ -72,8 +60,8 @@ fn disagreement(case: &Case, scale: f64) -> (f64, f64) {
         .keep(&["standard_error"]);
     let renderer = job.render();
     let (mean, error) = (read(&renderer, "composed"), read(&renderer, "standard_error"));
-    let reference = exr(case.reference.join(format!("{}.exr", case.component.1)));
-    let reference_error = exr(case.reference.join(format!("{}_stderr.exr", case.component.1)));
+    let reference = exr(&case.reference.join(format!("{}.exr", case.component.1)));
+    let reference_error = exr(&case.reference.join(format!("{}_stderr.exr", case.component.1)));
     let mine = blocks(mean.width, |x, y| rgb(&mean, x, y).map(|v| scale * v), |x, y| rgb(&error, x, y));
     let theirs = blocks(mean.width, |x, y| reference_rgb(&reference, x, y), |x, y| reference_rgb(&reference_error, x, y));
     let total = |blocks: &[([f64; 3], [f64; 3])]| blocks.iter().flat_map(|(mean, _)| *mean).sum::<f64>();

@@ -37,7 +37,7 @@ fn scenes() -> Vec<Scene> {
     scenes
 }
 
-fn exr(path: &Path) -> Picture {
+pub fn exr(path: &Path) -> Picture {
     read_picture(path).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -47,7 +47,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     sum / f64::from(count.max(1))
 }
 
-fn rgb(image: &Image, x: u32, y: u32) -> [f64; 3] {
+pub fn rgb(image: &Image, x: u32, y: u32) -> [f64; 3] {
     let p = image.pixel(x, y);
     [f64::from(p[0]), f64::from(p[1]), f64::from(p[2])]
 }
