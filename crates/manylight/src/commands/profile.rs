@@ -1,7 +1,5 @@
 //! `manylight profile`: what each node costs.
 
-use std::time::Instant;
-
 use manylight::{
     fault::Fault,
     files::{FileKind, check_writable},
@@ -12,7 +10,7 @@ use serde_json::json;
 use super::{
     adapter_line, of_file,
     session::{Session, of_render, settings, time_of},
-    stats::{self, FrameSamples, NodeSamples},
+    stats::{self, FrameSamples, NodeSamples, timed_frame},
     table::{Table, bytes},
 };
 use crate::{
@@ -71,13 +69,8 @@ fn measure(renderer: &mut Renderer, args: &ProfileArgs, mut trace: Option<&mut T
         renderer.measure_serially(one_by_one);
         for _ in 0..args.frames {
             let from_us = trace.as_ref().map_or(0.0, |t| t.now_us());
-            let start = Instant::now();
-            renderer.render_frame(time_of(&args.frame, number)).map_err(of_render)?;
+            let (timings, wall_ms) = timed_frame(renderer, time_of(&args.frame, number))?;
             number += 1;
-            let recorded = renderer.frame().index().wrapping_sub(1);
-            // Times of an older frame are no sample of this one.
-            let timings = renderer.wait_timings().filter(|t| t.frame == recorded);
-            let wall_ms = start.elapsed().as_secs_f64() * 1e3;
             if !one_by_one {
                 samples.push_frame(timings, wall_ms);
             }

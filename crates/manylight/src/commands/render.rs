@@ -1,7 +1,5 @@
 //! `manylight render`: frames of a scene, the last one written.
 
-use std::time::Instant;
-
 use manylight::{
     fault::Fault,
     files::{FileKind, write_text},
@@ -12,8 +10,8 @@ use serde_json::{Value, json};
 use super::{
     of_file,
     outputs::Outputs,
-    session::{Session, of_render, settings, time_of},
-    stats::{self, FrameSamples, serial_by_default},
+    session::{Session, settings, time_of},
+    stats::{self, FrameSamples, serial_by_default, timed_frame},
 };
 use crate::{
     cli::{Cli, RenderArgs},
@@ -62,12 +60,7 @@ fn frames(renderer: &mut Renderer, args: &RenderArgs) -> Result<FrameSamples, Fa
     for frame in 0..u64::from(args.frames) {
         let one_by_one = serial && frame % 2 == 1;
         renderer.measure_serially(one_by_one);
-        let start = Instant::now();
-        renderer.render_frame(time_of(&args.frame, frame)).map_err(of_render)?;
-        let recorded = renderer.frame().index().wrapping_sub(1);
-        // Times of an older frame are no sample of this one.
-        let timings = renderer.wait_timings().filter(|t| t.frame == recorded);
-        let wall_ms = start.elapsed().as_secs_f64() * 1e3;
+        let (timings, wall_ms) = timed_frame(renderer, time_of(&args.frame, frame))?;
         if !one_by_one {
             samples.push_frame(timings, wall_ms);
         }

@@ -1,5 +1,7 @@
 //! What is known of a rendered frame, as JSON for scripts.
 
+use std::time::Instant;
+
 use manylight::{
     fault::Fault,
     gpu::{FrameTimings, Gpu, GpuKind, Image, memory::Holding},
@@ -11,7 +13,18 @@ use manylight::{
 };
 use serde_json::{Map, Value, json};
 
+use super::session::of_render;
 use crate::samples::Samples;
+
+/// Renders a frame and waits for it: its times, if there is a sample, and the milliseconds until it was done.
+pub fn timed_frame(renderer: &mut Renderer, time: f64) -> Result<(Option<&FrameTimings>, f64), Fault> {
+    let start = Instant::now();
+    renderer.render_frame(time).map_err(of_render)?;
+    let recorded = renderer.frame().index().wrapping_sub(1);
+    // Times of an older frame are no sample of this one.
+    let timings = renderer.wait_timings().filter(|t| t.frame == recorded);
+    Ok((timings, start.elapsed().as_secs_f64() * 1e3))
+}
 
 /// Times of one node over several frames, in milliseconds.
 #[derive(Debug, Default, Clone)]
