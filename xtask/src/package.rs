@@ -2,7 +2,7 @@
 
 use crate::shell::{Shell, Stop};
 
-const CRATES: [&str; 5] = ["manylight-graph", "manylight-gpu", "manylight-scene", "manylight-passes", "manylight"];
+const CRATES: [&str; 6] = ["manylight-graph", "manylight-gpu", "manylight-scene", "manylight-passes", "manylight-lab", "manylight"];
 const EVERYWHERE: [&str; 4] = ["Cargo.toml", "LICENSE-APACHE", "LICENSE-MIT", "src/lib.rs"];
 /// Beginnings of paths that must be in `manylight`.
 const FRONT_DOOR: [&str; 5] = ["README.md", "shaders/common/", "pipelines/acrsm.ron", "pipelines/stages/", "assets/cornell.ron"];

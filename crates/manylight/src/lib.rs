@@ -29,18 +29,18 @@
 //! - [`files`]: EXR and PNG files, written whole or not at all; [`tone`]: from numbers to bytes to look at.
 //! - [`metrics`]: how far a picture is from a reference.
 //! - [`fault`]: what ends a command early, with its exit code.
-//! - [`graph`], [`gpu`], [`scene`], [`passes`]: the crates below.
+//! - [`graph`], [`gpu`], [`scene`], [`passes`], [`lab`]: the crates below.
 
 pub mod fault;
-pub mod files;
 pub mod library;
-pub mod metrics;
-pub mod tone;
 
 pub use manylight_gpu as gpu;
 pub use manylight_graph as graph;
+pub use manylight_lab as lab;
 pub use manylight_passes as passes;
 pub use manylight_scene as scene;
+
+pub use manylight_lab::{files, metrics, tone};
 
 pub use manylight_gpu::{Gpu, GpuOptions, Image};
 pub use manylight_passes::{

@@ -3,7 +3,6 @@
 mod cli;
 mod commands;
 mod progress;
-mod samples;
 mod trace;
 
 use std::process::ExitCode;

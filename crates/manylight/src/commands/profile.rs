@@ -3,6 +3,10 @@
 use manylight::{
     fault::Fault,
     files::{FileKind, check_writable},
+    lab::{
+        facts,
+        timing::{self, FrameSamples, NodeSamples, Samples, timed_frame},
+    },
     renderer::Renderer,
 };
 use serde_json::json;
@@ -10,13 +14,12 @@ use serde_json::json;
 use super::{
     adapter_line, of_file,
     session::{Session, of_render, settings, time_of},
-    stats::{self, FrameSamples, NodeSamples, timed_frame},
+    stats,
     table::{Table, bytes},
 };
 use crate::{
     cli::{Cli, ProfileArgs, TextOrJson, Timing},
     progress,
-    samples::Samples,
     trace::Trace,
 };
 
@@ -52,7 +55,7 @@ pub fn run(cli: &Cli, args: &ProfileArgs) -> Result<(), Fault> {
 /// Whether nodes are submitted one by one.
 fn is_serial(renderer: &Renderer, args: &ProfileArgs) -> bool {
     match args.timing {
-        Timing::Auto => stats::serial_by_default(renderer.gpu()),
+        Timing::Auto => timing::serial_by_default(renderer.gpu()),
         Timing::Timestamps => false,
         Timing::Serial => true,
     }
@@ -69,7 +72,7 @@ fn measure(renderer: &mut Renderer, args: &ProfileArgs, mut trace: Option<&mut T
         renderer.measure_serially(one_by_one);
         for _ in 0..args.frames {
             let from_us = trace.as_ref().map_or(0.0, |t| t.now_us());
-            let (timings, wall_ms) = timed_frame(renderer, time_of(&args.frame, number))?;
+            let (timings, wall_ms) = timed_frame(renderer, time_of(&args.frame, number)).map_err(of_render)?;
             number += 1;
             if !one_by_one {
                 samples.push_frame(timings, wall_ms);
@@ -85,18 +88,6 @@ fn measure(renderer: &mut Renderer, args: &ProfileArgs, mut trace: Option<&mut T
     }
     bar.finish_and_clear();
     Ok(samples)
-}
-
-/// Nodes of one stage together: medians and percentiles are added, which is exact for medians only if the nodes vary alike.
-fn by_stage(samples: &FrameSamples) -> Vec<(String, Vec<&NodeSamples>)> {
-    let mut stages: Vec<(String, Vec<&NodeSamples>)> = Vec::new();
-    for node in &samples.nodes {
-        match stages.iter_mut().find(|(stage, _)| *stage == node.stage) {
-            Some((_, nodes)) => nodes.push(node),
-            None => stages.push((node.stage.clone(), vec![node])),
-        }
-    }
-    stages
 }
 
 fn sum(nodes: &[&NodeSamples], value: impl Fn(&NodeSamples) -> Option<f64>) -> Option<f64> {
@@ -152,7 +143,7 @@ fn text(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> Stri
         nodes.row(vec!["(between nodes)".to_owned(), String::new(), ms(rest), String::new(), share(rest, total)]);
     }
     let mut stages = Table::new(&[&[("stage", true), ("nodes", false)][..], &columns].concat());
-    for (stage, nodes) in by_stage(samples) {
+    for (stage, nodes) in samples.by_stage() {
         let gpu = |value: fn(&NodeSamples) -> Option<f64>| {
             if nodes.iter().all(|n| n.host) { "on the host".to_owned() } else { ms(sum(&nodes, value)) }
         };
@@ -206,7 +197,8 @@ fn memory_table(renderer: &Renderer) -> String {
 
 fn report(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> serde_json::Value {
     let (width, height) = renderer.settings().size;
-    let stages: Vec<_> = by_stage(samples)
+    let stages: Vec<_> = samples
+        .by_stage()
         .into_iter()
         .map(|(stage, nodes)| {
             json!({
@@ -217,7 +209,7 @@ fn report(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> se
             })
         })
         .collect();
-    let mut report = stats::timings(samples, is_serial(renderer, args));
+    let mut report = timing::timings(samples, is_serial(renderer, args));
     report["stages"] = json!(stages);
     json!({
         "manylight": env!("CARGO_PKG_VERSION"),
@@ -226,8 +218,8 @@ fn report(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> se
         "size": [width, height],
         "frames": args.frames,
         "warm_up": args.warm_up,
-        "adapter": stats::adapter(renderer.gpu()),
-        "parameters": stats::parameters(renderer.plan()),
+        "adapter": facts::adapter(renderer.gpu()),
+        "parameters": facts::parameters(renderer.plan()),
         "timings": report,
         "memory": stats::memory(renderer),
     })

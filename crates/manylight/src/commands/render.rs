@@ -3,6 +3,10 @@
 use manylight::{
     fault::Fault,
     files::{FileKind, write_text},
+    lab::{
+        facts,
+        timing::{self, FrameSamples, serial_by_default, timed_frame},
+    },
     renderer::Renderer,
 };
 use serde_json::{Value, json};
@@ -10,8 +14,8 @@ use serde_json::{Value, json};
 use super::{
     of_file,
     outputs::Outputs,
-    session::{Session, settings, time_of},
-    stats::{self, FrameSamples, serial_by_default, timed_frame},
+    session::{Session, of_render, settings, time_of},
+    stats,
 };
 use crate::{
     cli::{Cli, RenderArgs},
@@ -60,7 +64,7 @@ fn frames(renderer: &mut Renderer, args: &RenderArgs) -> Result<FrameSamples, Fa
     for frame in 0..u64::from(args.frames) {
         let one_by_one = serial && frame % 2 == 1;
         renderer.measure_serially(one_by_one);
-        let (timings, wall_ms) = timed_frame(renderer, time_of(&args.frame, frame))?;
+        let (timings, wall_ms) = timed_frame(renderer, time_of(&args.frame, frame)).map_err(of_render)?;
         if !one_by_one {
             samples.push_frame(timings, wall_ms);
         }
@@ -88,9 +92,9 @@ fn stats(renderer: &Renderer, args: &RenderArgs, samples: &FrameSamples) -> Resu
         "frames": args.frames,
         "time": time_of(&args.frame, u64::from(args.frames) - 1),
         "seed": args.frame.seed,
-        "adapter": stats::adapter(renderer.gpu()),
-        "parameters": stats::parameters(plan),
-        "timings": stats::timings(samples, serial_by_default(renderer.gpu())),
+        "adapter": facts::adapter(renderer.gpu()),
+        "parameters": facts::parameters(plan),
+        "timings": timing::timings(samples, serial_by_default(renderer.gpu())),
         "memory": stats::memory(renderer),
         "plan": plan.to_json(),
         "sums": stats::sums(renderer, &names)?,

@@ -1,125 +1,12 @@
 //! What is known of a rendered frame, as JSON for scripts.
 
-use std::time::Instant;
-
 use manylight::{
     fault::Fault,
-    gpu::{FrameTimings, Gpu, GpuKind, Image, memory::Holding},
-    graph::{
-        plan::Plan,
-        value::{ResourceDesc, Value as Parameter},
-    },
+    gpu::{Image, memory::Holding},
+    graph::value::ResourceDesc,
     renderer::Renderer,
 };
 use serde_json::{Map, Value, json};
-
-use super::session::of_render;
-use crate::samples::Samples;
-
-/// Renders a frame and waits for it: its times, if there is a sample, and the milliseconds until it was done.
-pub fn timed_frame(renderer: &mut Renderer, time: f64) -> Result<(Option<&FrameTimings>, f64), Fault> {
-    let start = Instant::now();
-    renderer.render_frame(time).map_err(of_render)?;
-    let recorded = renderer.frame().index().wrapping_sub(1);
-    // Times of an older frame are no sample of this one.
-    let timings = renderer.wait_timings().filter(|t| t.frame == recorded);
-    Ok((timings, start.elapsed().as_secs_f64() * 1e3))
-}
-
-/// Times of one node over several frames, in milliseconds.
-#[derive(Debug, Default, Clone)]
-pub struct NodeSamples {
-    pub id: String,
-    pub stage: String,
-    /// Whether it runs on the CPU only.
-    pub host: bool,
-    pub cpu: Samples,
-    pub gpu: Samples,
-}
-
-/// Times of several frames, in milliseconds.
-#[derive(Debug, Default, Clone)]
-pub struct FrameSamples {
-    pub nodes: Vec<NodeSamples>,
-    /// To record and submit a frame.
-    pub cpu: Samples,
-    /// From the first pass to the last.
-    pub gpu: Samples,
-    /// From the start of recording until the GPU is done.
-    pub wall: Samples,
-}
-
-impl FrameSamples {
-    /// For the nodes of a plan.
-    pub fn new(plan: &Plan) -> Self {
-        let nodes = plan.nodes.iter().map(|n| NodeSamples {
-            id: n.id.clone(),
-            stage: n.stage.clone(),
-            host: n.decl.shader.is_none(),
-            ..NodeSamples::default()
-        });
-        Self { nodes: nodes.collect(), ..Self::default() }
-    }
-
-    /// Adds the times of a frame as a whole; `wall_ms` from the start of recording until the GPU was done.
-    pub fn push_frame(&mut self, timings: Option<&FrameTimings>, wall_ms: f64) {
-        self.wall.push(Some(wall_ms));
-        let Some(timings) = timings else { return };
-        self.cpu.push(Some(milliseconds(timings.cpu_ns)));
-        self.gpu.push(timings.gpu_ns.map(milliseconds));
-    }
-
-    /// Adds the times of the nodes of a frame.
-    pub fn push_nodes(&mut self, timings: Option<&FrameTimings>) {
-        let Some(timings) = timings else { return };
-        for (samples, timing) in self.nodes.iter_mut().zip(&timings.nodes) {
-            samples.cpu.push(Some(milliseconds(timing.cpu_ns)));
-            samples.gpu.push(timing.gpu_ns.map(milliseconds));
-        }
-    }
-}
-
-fn milliseconds(ns: u64) -> f64 {
-    ns as f64 / 1e6
-}
-
-/// Median, 95th percentile and number; `null` without a sample.
-pub fn summary(samples: &Samples) -> Value {
-    match (samples.median(), samples.percentile(95.0)) {
-        (Some(median), Some(p95)) => json!({"median": median, "p95": p95, "samples": samples.len()}),
-        _ => Value::Null,
-    }
-}
-
-pub fn adapter(gpu: &Gpu) -> Value {
-    let info = gpu.adapter_info();
-    json!({
-        "name": info.name,
-        "kind": gpu.kind().name(),
-        "backend": format!("{:?}", info.backend),
-        "driver": format!("{} {}", info.driver, info.driver_info).trim(),
-        "timestamps": gpu.has_timestamps(),
-    })
-}
-
-/// Whether nodes are best timed by submitting one after the other: timestamps of a software adapter are not tied to the work around them.
-pub fn serial_by_default(gpu: &Gpu) -> bool {
-    gpu.kind() == GpuKind::Software
-}
-
-/// All times; `serial`: nodes were submitted one after the other.
-pub fn timings(samples: &FrameSamples, serial: bool) -> Value {
-    let nodes: Vec<Value> = samples
-        .nodes
-        .iter()
-        .map(|n| json!({"id": n.id, "stage": n.stage, "host": n.host, "cpu_ms": summary(&n.cpu), "gpu_ms": summary(&n.gpu)}))
-        .collect();
-    json!({
-        "method": if serial { "serial" } else { "timestamps" },
-        "frame": {"wall_ms": summary(&samples.wall), "cpu_ms": summary(&samples.cpu), "gpu_ms": summary(&samples.gpu)},
-        "nodes": nodes,
-    })
-}
 
 /// How a resource holds its memory, in a word.
 pub fn holding(holding: Holding) -> String {
@@ -146,16 +33,6 @@ pub fn memory(renderer: &Renderer) -> Value {
         "external": report.external,
         "resources": resources,
     })
-}
-
-pub fn parameters(plan: &Plan) -> Value {
-    let value = |value: &Parameter| match value {
-        Parameter::Int(v) => json!(v),
-        Parameter::Float(v) => json!(v),
-        Parameter::Bool(v) => json!(v),
-        Parameter::Choice(v) => json!(v),
-    };
-    Value::Object(plan.params.iter().map(|(name, v)| (name.clone(), value(v))).collect())
 }
 
 /// Sums of every named resource: of textures by channel, of buffers by field.

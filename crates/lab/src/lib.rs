@@ -1,0 +1,23 @@
+//! What a picture costs and how far it is from the truth: pictures on disk, error metrics, times.
+//!
+//! ```
+//! use manylight_lab::{files::Picture, metrics};
+//!
+//! let reference = Picture::linear(2, 1, 3, vec![1.0; 6]);
+//! let image = Picture::linear(2, 1, 3, vec![1.0, 1.0, 1.0, 1.0, 1.0, 1.5]);
+//! let metrics = metrics::compare(&image, &reference)?;
+//! assert_eq!(metrics.energy_ratio(), Some(6.5 / 6.0));
+//! # Ok::<(), metrics::CompareError>(())
+//! ```
+//!
+//! - [`files`]: EXR and PNG files, written whole or not at all; [`tone`]: from numbers to bytes to look at.
+//! - [`metrics`]: how far a picture is from a reference.
+//! - [`timing`]: times of frames and nodes; [`facts`]: adapter and parameters as JSON.
+
+pub mod facts;
+pub mod files;
+pub mod metrics;
+pub mod timing;
+pub mod tone;
+
+mod samples;
