@@ -1,0 +1,266 @@
+//! Records of runs: one JSON object a line, with everything that the numbers depend on.
+
+use std::{
+    fs::{self, OpenOptions},
+    io::{ErrorKind, Write},
+    path::{Path, PathBuf},
+};
+
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    files::{FileError, write_text},
+    timing::{FrameSamples, Samples},
+};
+
+/// Version of the format of records; records of another one are not read.
+pub const FORMAT: u32 = 1;
+
+/// One run of a sweep: its inputs, what it cost and how far its picture is from the truth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// [`FORMAT`].
+    pub format: u32,
+    /// Which run of the sweep it is: variant, settings, scene, size and seed in words. Unique within a sweep.
+    pub run: String,
+    /// Hash of all inputs below, of the shaders and of the adapter: equal hash, equal picture.
+    pub inputs: String,
+    /// The sweep's name.
+    pub sweep: String,
+    /// The variant's name.
+    pub variant: String,
+    /// The pipeline's name.
+    pub pipeline: String,
+    /// Parameters that the sweep sets for this run, by pipeline or node parameter.
+    pub set: IndexMap<String, String>,
+    /// Those of them that vary within the variant, in the order of the sweep.
+    pub varied: Vec<String>,
+    /// Every parameter of the pipeline with its value.
+    pub parameters: serde_json::Value,
+    /// The scene.
+    pub scene: SceneFacts,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Frames rendered before the picture was taken, that one included.
+    pub frames: u32,
+    /// Frames measured after that.
+    pub measured: u32,
+    /// Scene time of the first frame in seconds.
+    pub time: f64,
+    /// Frames a second of scene time; `None`: time stands still.
+    pub fps: Option<f64>,
+    /// Seed of everything random.
+    pub seed: u32,
+    /// The resource that is compared.
+    pub image: String,
+    /// What it is compared with.
+    pub reference: ReferenceFacts,
+    /// What pixels count, in words; `None`: all.
+    pub mask: Option<String>,
+    /// Name, kind, backend and driver of the adapter, as [`crate::facts::adapter`] gives them.
+    pub adapter: serde_json::Value,
+    /// Version of manylight.
+    pub manylight: String,
+    /// When the run ended, UTC, RFC 3339.
+    pub date: String,
+    /// What it cost.
+    pub times: Times,
+    /// Memory of the frame in bytes, besides the scene.
+    pub memory: u64,
+    /// Errors by the names of [`crate::metrics`]; those that are not defined (a ratio to black) are absent.
+    pub metrics: IndexMap<String, f64>,
+    /// Errors over time, when the sweep asks for a sequence.
+    pub sequence: Vec<FrameError>,
+    /// Files of the pictures, relative to the folder of the records.
+    pub pictures: Pictures,
+}
+
+/// A scene as a record names it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SceneFacts {
+    /// Its name.
+    pub name: String,
+    /// Hash of the contents of its files, hexadecimal.
+    pub hash: String,
+    /// Triangles of all objects.
+    pub triangles: u64,
+}
+
+/// A reference as a record names it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ReferenceFacts {
+    /// The component that was path-traced, or the name of the file.
+    pub name: String,
+    /// Hash of what it was made from, or of the file's contents, hexadecimal.
+    pub hash: String,
+    /// Paths a pixel, if it was path-traced.
+    pub paths: Option<u64>,
+    /// Root of the mean squared standard error of its pixels over its mean, where known.
+    pub relative_standard_error: Option<f64>,
+}
+
+/// Times of a run in milliseconds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Times {
+    /// How nodes were timed: `timestamps`, or `serial` (each submitted on its own and waited for).
+    pub method: String,
+    /// Times of a frame are those of a CPU.
+    pub software: bool,
+    /// From the start of recording until the GPU was done.
+    pub wall: Summary,
+    /// From the first pass to the last, where the adapter has timestamps.
+    pub gpu: Option<Summary>,
+    /// To record and submit.
+    pub cpu: Option<Summary>,
+    /// All frames until the picture was taken, together: what a picture costs from nothing.
+    pub until_picture: f64,
+    /// Node by node, in the order of the plan.
+    pub nodes: Vec<NodeTime>,
+}
+
+impl Times {
+    /// The time of a frame: the GPU's where it has timestamps and is one, else until it was done.
+    pub fn frame(&self) -> f64 {
+        self.gpu.as_ref().filter(|_| !self.software).map_or(self.wall.median, |gpu| gpu.median)
+    }
+
+    /// Sum of the medians of each stage's nodes, in the order of their first nodes.
+    pub fn stages(&self) -> Vec<(String, f64)> {
+        let mut stages: IndexMap<&str, f64> = IndexMap::new();
+        for node in &self.nodes {
+            *stages.entry(&node.stage).or_default() += node.median;
+        }
+        stages.into_iter().map(|(stage, time)| (stage.to_owned(), time)).collect()
+    }
+}
+
+/// Time of a node in milliseconds, on the processor that does its work.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NodeTime {
+    /// Id in the pipeline.
+    pub id: String,
+    /// Its stage.
+    pub stage: String,
+    /// Median; 0 where there was no sample.
+    pub median: f64,
+    /// 95th percentile.
+    pub p95: f64,
+}
+
+/// Several measurements of one quantity.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Middle value.
+    pub median: f64,
+    /// 95th percentile, nearest rank.
+    pub p95: f64,
+    /// Number of measurements.
+    pub samples: usize,
+}
+
+impl Summary {
+    /// Of samples; `None` without any.
+    pub fn of(samples: &Samples) -> Option<Self> {
+        Some(Self { median: samples.median()?, p95: samples.percentile(95.0)?, samples: samples.len() })
+    }
+}
+
+/// Times of the nodes of several frames.
+pub fn node_times(samples: &FrameSamples) -> Vec<NodeTime> {
+    let time = |n: &crate::timing::NodeSamples| {
+        let own = if n.host { &n.cpu } else { &n.gpu };
+        let (median, p95) = (own.median().unwrap_or(0.0), own.percentile(95.0).unwrap_or(0.0));
+        NodeTime { id: n.id.clone(), stage: n.stage.clone(), median, p95 }
+    };
+    samples.nodes.iter().map(time).collect()
+}
+
+/// Error at one time of a sequence.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrameError {
+    /// Scene time in seconds.
+    pub time: f64,
+    /// Errors by name.
+    pub metrics: IndexMap<String, f64>,
+}
+
+/// Files of a run's pictures.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Pictures {
+    /// What was compared, tone mapped by one exposure for all runs of a scene.
+    pub image: Option<String>,
+    /// The reference, alike.
+    pub reference: Option<String>,
+    /// The error map.
+    pub error: Option<String>,
+}
+
+/// A line of a file that is no record.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Damage {
+    /// The file.
+    pub file: PathBuf,
+    /// From 1.
+    pub line: usize,
+    /// What is wrong.
+    pub reason: String,
+}
+
+impl std::fmt::Display for Damage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}:{}: no record ({})", self.file.display(), self.line, self.reason)
+    }
+}
+
+/// Reads all records of a file; a file that is not there has none. Lines that are no records are told.
+///
+/// # Errors
+/// The file is there and cannot be read.
+pub fn read(file: &Path) -> Result<(Vec<Record>, Vec<Damage>), FileError> {
+    let bytes = match fs::read(file) {
+        Ok(bytes) => bytes,
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok((Vec::new(), Vec::new())),
+        Err(e) => return Err(FileError::read(file, e)),
+    };
+    let (mut records, mut damaged) = (Vec::new(), Vec::new());
+    for (index, line) in bytes.split(|b| *b == b'\n').enumerate() {
+        if line.iter().all(u8::is_ascii_whitespace) {
+            continue;
+        }
+        let reason = match serde_json::from_slice::<Record>(line) {
+            Ok(record) if record.format == FORMAT => {
+                records.push(record);
+                continue;
+            }
+            Ok(record) => format!("format {}, this version reads {FORMAT}", record.format),
+            Err(e) => e.to_string(),
+        };
+        damaged.push(Damage { file: file.to_owned(), line: index + 1, reason });
+    }
+    Ok((records, damaged))
+}
+
+/// Adds a record at the end of a file and sees that it is on the disk.
+///
+/// # Errors
+/// The disk is full, or the file cannot be written.
+pub fn append(file: &Path, record: &Record) -> Result<(), FileError> {
+    let failed = |e: &std::io::Error| FileError::write(file, e);
+    let line = line(record).map_err(|e| failed(&e))?;
+    let mut out = OpenOptions::new().create(true).append(true).open(file).map_err(|e| failed(&e))?;
+    out.write_all(line.as_bytes()).and_then(|()| out.sync_data()).map_err(|e| failed(&e))
+}
+
+/// Replaces a file by these records.
+///
+/// # Errors
+/// The file cannot be written; the old one stays.
+pub fn write(file: &Path, records: &[Record]) -> Result<(), FileError> {
+    let lines: Result<String, _> = records.iter().map(line).collect();
+    write_text(file, &lines.map_err(|e| FileError::write(file, &e))?)
+}
+
+fn line(record: &Record) -> Result<String, std::io::Error> {
+    Ok(serde_json::to_string(record)? + "\n")
+}

@@ -1,0 +1,43 @@
+//! What a report says besides the records: the sweep's words, the axes of its plots, figures of papers to set beside ours.
+
+/// How a sweep wants its records to be shown.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Sheet {
+    /// The sweep's name.
+    pub name: String,
+    /// What it asks, in its own words.
+    pub doc: String,
+    /// The metric on the error axes, by its name in [`crate::metrics`].
+    pub metric: String,
+    /// The columns of tables, by name.
+    pub metrics: Vec<String>,
+    /// Tables of a paper.
+    pub papers: Vec<Paper>,
+    /// Error over time of other renderers.
+    pub curves: Vec<Curve>,
+}
+
+/// A table of a paper, as printed there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Paper {
+    /// Paper and table or figure: `[VAL] table 1`.
+    pub source: String,
+    /// What its numbers are: `ms`, `fps`.
+    pub unit: String,
+    /// Label of the row, of the column and number. Where a row has the name of a variant (or of a whole run) and a column that of a stage
+    /// or `frame`, the report sets ours beside it.
+    pub values: Vec<(String, String, f64)>,
+}
+
+/// Error over time of another renderer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// What it is and where it was measured.
+    pub name: String,
+    /// The scene that it is of.
+    pub scene: String,
+    /// The metric.
+    pub metric: String,
+    /// Milliseconds and error.
+    pub points: Vec<(f64, f64)>,
+}
