@@ -15,6 +15,11 @@ impl Samples {
         self.0.len()
     }
 
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// Middle value; the mean of the two middle ones when their number is even. `None` without measurements.
     pub fn median(&self) -> Option<f64> {
         let sorted = self.sorted();
