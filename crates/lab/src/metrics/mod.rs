@@ -12,6 +12,7 @@ mod known;
 mod mask;
 mod pair;
 mod ssim;
+mod z_test;
 
 pub use difference::Metrics;
 pub use display::{display, exposure_of};
@@ -19,6 +20,7 @@ pub use error_map::{ErrorMap, ErrorMapKind, NOT_FINITE, OUTSIDE, error_map};
 pub use known::{Best, KNOWN, Known};
 pub use mask::{Condition, Mask};
 pub use pair::CompareError;
+pub use z_test::{Estimate, Ratio, ZTest, z_test};
 
 use crate::files::Picture;
 use pair::Pair;
