@@ -7,6 +7,7 @@
 mod difference;
 mod display;
 mod error_map;
+mod flicker;
 mod flip;
 mod known;
 mod mask;
@@ -17,6 +18,7 @@ mod z_test;
 pub use difference::Metrics;
 pub use display::{display, exposure_of};
 pub use error_map::{ErrorMap, ErrorMapKind, NOT_FINITE, OUTSIDE, error_map};
+pub use flicker::flicker;
 pub use known::{Best, KNOWN, Known};
 pub use mask::{Condition, Mask};
 pub use pair::CompareError;
