@@ -9,4 +9,5 @@ mod path_tracer;
 mod reference;
 mod renders;
 mod support;
+mod sweeps;
 mod walkthrough;

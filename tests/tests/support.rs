@@ -69,10 +69,16 @@ pub fn manylight(arguments: &[&str]) -> Run {
     manylight_in(&root(), arguments)
 }
 
+/// The program in the repository's root, for tests that do not wait for its end.
+pub fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(program());
+    command.args(arguments).current_dir(root());
+    command
+}
+
 /// Runs the program in a folder.
 pub fn manylight_in(folder: &Path, arguments: &[&str]) -> Run {
-    let Output { status, stdout, stderr } =
-        Command::new(program()).args(arguments).current_dir(folder).output().expect("the program starts");
+    let Output { status, stdout, stderr } = command(arguments).current_dir(folder).output().expect("the program starts");
     Run {
         code: status.code(),
         stdout: String::from_utf8_lossy(&stdout).into_owned(),

@@ -7,11 +7,11 @@ use crate::{
     diagnostics::{Diagnostic, Diagnostics, Severity, Source},
     features,
     library::Library,
-    pipeline::{Gaps, Pipeline},
+    pipeline::{Gaps, Pipeline, Preset},
     plan::PlanInput,
     planner::Planner,
     registry::Registry,
-    resolve::{Linked, link},
+    resolve::{Linked, link, preset_fault},
     unused,
     value::{ParamKind, Value},
 };
@@ -67,6 +67,12 @@ pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
         out.extend(unused::find(&linked));
     }
     Diagnostics(out).sorted()
+}
+
+/// Checks values that another document (a sweep) gives to parameters of a pipeline, each at its place. Faults of the pipeline itself are not told.
+pub fn check_values<'a>(pipeline: &Pipeline, registry: &Registry, values: impl IntoIterator<Item = (&'a str, &'a Preset)>) -> Diagnostics {
+    let linked = link(pipeline, registry, features::KNOWN.to_vec(), &mut Vec::new());
+    Diagnostics(values.into_iter().filter_map(|(name, value)| preset_fault(pipeline, &linked.nodes, name, value)).collect())
 }
 
 /// Reads a pipeline and checks it: all faults of its text and of its meaning at once.

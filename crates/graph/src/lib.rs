@@ -83,6 +83,7 @@ pub use render::nearest;
 /// Reading RON with the place of every value: what documents of other crates (scenes) are read with, too.
 pub mod ron {
     pub use crate::{
+        params::read_literal,
         reader::{Fields, Reader, Shape, Spanned, head},
         render::suggest,
         tree::{Kind, Name, Tree},

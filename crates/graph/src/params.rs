@@ -130,7 +130,8 @@ fn quoted(names: &[String]) -> String {
 }
 
 /// Reads a literal value.
-pub(crate) fn read_literal(reader: &mut Reader, tree: &Tree) -> Option<Literal> {
+/// Reads a value of a parameter, of whatever type; names without quotes are told.
+pub fn read_literal(reader: &mut Reader, tree: &Tree) -> Option<Literal> {
     match &tree.kind {
         Kind::Bool(v) => Some(Literal::Bool(*v)),
         Kind::Text(v) => Some(Literal::Text(v.clone())),

@@ -76,6 +76,7 @@ mod resources;
 mod whole;
 
 pub(crate) use params::settable;
+pub(crate) use whole::preset_fault;
 
 struct Linker<'a, 'o> {
     pipeline: &'a Pipeline,

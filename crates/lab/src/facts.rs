@@ -3,6 +3,7 @@
 use manylight_gpu::Gpu;
 use manylight_graph::{plan::Plan, value::Value as Parameter};
 use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
 
 /// Name, kind, backend and driver of the adapter.
 pub fn adapter(gpu: &Gpu) -> Value {
@@ -25,4 +26,22 @@ pub fn parameters(plan: &Plan) -> Value {
         Parameter::Choice(v) => json!(v),
     };
     Value::Object(plan.params.iter().map(|(name, v)| (name.clone(), value(v))).collect())
+}
+
+/// Everything that decides what a plan's GPU work computes: nodes with their shaders, parameters, connections and sizes.
+pub fn fingerprint(plan: &Plan) -> String {
+    let shaders: Vec<String> =
+        plan.nodes.iter().map(|n| n.decl.shader.as_ref().map_or(String::new(), |s| format!("{:016x}", s.hash))).collect();
+    hash(&[&plan.to_json().to_string(), &shaders.join(" ")])
+}
+
+/// Hash of several parts, hexadecimal: the first half of SHA-256, which is enough to tell any two apart.
+pub fn hash(parts: &[&(impl AsRef<[u8]> + ?Sized)]) -> String {
+    let mut digest = Sha256::new();
+    for part in parts {
+        // The lengths keep ("ab", "c") and ("a", "bc") apart.
+        digest.update((part.as_ref().len() as u64).to_le_bytes());
+        digest.update(part.as_ref());
+    }
+    digest.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect()
 }

@@ -12,6 +12,7 @@
 //!
 //! - [`files`]: EXR and PNG files, written whole or not at all; [`tone`]: from numbers to bytes to look at.
 //! - [`metrics`]: how far a picture is from a reference.
+//! - [`sweep`]: many runs of pipelines, from one document.
 //! - [`record`]: what a run cost and how far it is off, as JSON Lines; [`sheet`]: how a report shows them.
 //! - [`timing`]: times of frames and nodes; [`facts`]: adapter and parameters as JSON.
 
@@ -20,7 +21,9 @@ pub mod files;
 pub mod metrics;
 pub mod record;
 pub mod sheet;
+pub mod sweep;
 pub mod timing;
 pub mod tone;
+pub mod tune;
 
 mod samples;

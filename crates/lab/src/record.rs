@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     files::{FileError, write_text},
+    sheet::Axis,
     timing::{FrameSamples, Samples},
 };
 
@@ -123,6 +124,14 @@ impl Times {
     /// The time of a frame: the GPU's where it has timestamps and is one, else until it was done.
     pub fn frame(&self) -> f64 {
         self.gpu.as_ref().filter(|_| !self.software).map_or(self.wall.median, |gpu| gpu.median)
+    }
+
+    /// The time that an axis shows.
+    pub fn on(&self, axis: Axis) -> f64 {
+        match axis {
+            Axis::Frame => self.frame(),
+            Axis::Picture => self.until_picture,
+        }
     }
 
     /// Sum of the medians of each stage's nodes, in the order of their first nodes.
@@ -263,4 +272,94 @@ pub fn write(file: &Path, records: &[Record]) -> Result<(), FileError> {
 
 fn line(record: &Record) -> Result<String, std::io::Error> {
     Ok(serde_json::to_string(record)? + "\n")
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A record of a variant and one knob.
+    pub(crate) fn example(variant: &str, clusters: u32, frame_ms: f64, error: f64) -> Record {
+        let summary = Summary { median: frame_ms, p95: frame_ms * 1.1, samples: 8 };
+        let node =
+            |id: &str, stage: &str, share: f64| NodeTime { id: id.into(), stage: stage.into(), median: share * frame_ms, p95: frame_ms };
+        Record {
+            format: FORMAT,
+            run: format!("{variant} clusters={clusters} | cornell | 256x256 | seed 0"),
+            inputs: format!("{variant}{clusters}"),
+            sweep: "example".into(),
+            variant: variant.into(),
+            pipeline: "acrsm".into(),
+            set: [("clusters".to_owned(), clusters.to_string()), ("visibility".to_owned(), "pcss".to_owned())].into_iter().collect(),
+            varied: vec!["clusters".into()],
+            parameters: serde_json::json!({"clusters": clusters}),
+            scene: SceneFacts { name: "cornell".into(), hash: "0123456789abcdef".into(), triangles: 34 },
+            size: [256, 256],
+            frames: 24,
+            measured: 8,
+            time: 0.0,
+            fps: None,
+            seed: 0,
+            image: "indirect".into(),
+            reference: ReferenceFacts {
+                name: "one_bounce".into(),
+                hash: "ab".into(),
+                paths: Some(1024),
+                relative_standard_error: Some(0.01),
+            },
+            mask: None,
+            adapter: serde_json::json!({"name": "Example", "kind": "discrete GPU"}),
+            manylight: "0.1.0".into(),
+            date: "2026-01-02T03:04:05Z".into(),
+            times: Times {
+                method: "timestamps".into(),
+                software: false,
+                wall: summary,
+                gpu: Some(summary),
+                cpu: None,
+                until_picture: 24.0 * frame_ms,
+                nodes: vec![node("map", "clustering", 0.25), node("splat", "ism", 0.25), node("indirect", "indirect", 0.5)],
+            },
+            memory: 1 << 20,
+            metrics: [("relative_mean_absolute_error".to_owned(), error), ("relative_rmse".to_owned(), 2.0 * error)].into_iter().collect(),
+            sequence: Vec::new(),
+            pictures: Pictures::default(),
+        }
+    }
+
+    #[test]
+    fn records_come_back_and_damaged_lines_are_told() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let file = folder.path().join("records.jsonl");
+        let records = [example("a", 16, 1.0, 0.3), example("b", 32, 1.0 / 3.0, 0.1 + 0.2)];
+        for record in &records {
+            append(&file, record).expect("writable");
+        }
+        assert_eq!(read(&file).expect("readable"), (records.to_vec(), Vec::new()));
+        let other = Record { format: FORMAT + 1, ..records[0].clone() };
+        let text = fs::read_to_string(&file).expect("readable");
+        fs::write(&file, format!("{{\"half\": \n\n{text}{}\n\u{0}", serde_json::to_string(&other).expect("JSON"))).expect("writable");
+        let (good, damaged) = read(&file).expect("readable");
+        assert_eq!(good, records);
+        assert_eq!(damaged.iter().map(|d| d.line).collect::<Vec<_>>(), [1, 5, 6]);
+        assert!(damaged[1].reason.contains("format 2"), "{}", damaged[1]);
+        assert_eq!(read(&folder.path().join("nothing.jsonl")).expect("no file, no records"), (Vec::new(), Vec::new()));
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_full_disk_is_a_fault_that_says_so() {
+        let fault = append(Path::new("/dev/full"), &example("a", 16, 1.0, 0.3)).expect_err("no space").to_string();
+        assert!(fault.contains("/dev/full") && fault.contains("No space left"), "{fault}");
+    }
+
+    #[test]
+    fn stages_are_sums_of_their_nodes() {
+        let mut record = example("a", 16, 8.0, 0.1);
+        record.times.nodes.push(NodeTime { id: "average".into(), stage: "clustering".into(), median: 1.0, p95: 1.0 });
+        assert_eq!(record.times.stages(), [("clustering".to_owned(), 3.0), ("ism".to_owned(), 2.0), ("indirect".to_owned(), 4.0)]);
+        record.times.software = true;
+        record.times.wall.median = 9.0;
+        assert_eq!((record.times.frame(), record.times.on(Axis::Picture)), (9.0, 192.0));
+    }
 }

@@ -7,6 +7,8 @@ pub struct Sheet {
     pub name: String,
     /// What it asks, in its own words.
     pub doc: String,
+    /// The time on the time axes.
+    pub axis: Axis,
     /// The metric on the error axes, by its name in [`crate::metrics`].
     pub metric: String,
     /// The columns of tables, by name.
@@ -15,6 +17,29 @@ pub struct Sheet {
     pub papers: Vec<Paper>,
     /// Error over time of other renderers.
     pub curves: Vec<Curve>,
+}
+
+/// Which time a plot shows.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Axis {
+    /// Of one frame: what a moving picture costs.
+    #[default]
+    Frame,
+    /// Of all frames until the picture: what one picture costs from nothing.
+    Picture,
+}
+
+impl Axis {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Frame, Self::Picture];
+
+    /// Its name in a sweep.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Frame => "frame",
+            Self::Picture => "picture",
+        }
+    }
 }
 
 /// A table of a paper, as printed there.

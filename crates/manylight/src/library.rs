@@ -3,10 +3,15 @@
 use std::{
     env,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use include_dir::{Dir, include_dir};
-use manylight_graph::{library::Library, nearest};
+use manylight_graph::{
+    diagnostics::Source,
+    library::{Library, ReadError},
+    nearest,
+};
 use manylight_passes::SceneSource;
 
 use crate::fault::Fault;
@@ -14,6 +19,8 @@ use crate::fault::Fault;
 static SHADERS: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/shaders");
 static PIPELINES: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/pipelines");
 static ASSETS: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/assets");
+
+const SWEEPS: &str = "pipelines/sweeps";
 
 /// The environment variable that names the root folder.
 pub const ROOT_VARIABLE: &str = "MANYLIGHT_ROOT";
@@ -83,6 +90,34 @@ pub fn scene(library: &Library, name: &str) -> Result<SceneSource, Fault> {
         None => format!("name a .ron or .obj file, or one of {}", known.join(", ")),
     };
     Err(Fault::Input(format!("there is no scene `{name}`; {help}")))
+}
+
+/// A sweep by path or by name in `pipelines/sweeps/`.
+///
+/// # Errors
+/// There is no such sweep, or it cannot be read; the nearest name is told.
+pub fn sweep(library: &Library, name: &str) -> Result<Arc<Source>, Fault> {
+    if Path::new(name).is_file() {
+        return Library::read_file(Path::new(name)).map_err(|e| Fault::Documents(e.diagnostic().into()));
+    }
+    let path = format!("{SWEEPS}/{}.ron", name.trim_end_matches(".ron"));
+    library.fetch(&path).map_err(|error| {
+        let known = sweep_names(library);
+        let help = match nearest(name, known.iter().map(String::as_str)) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("name a .ron file, or one of {}", known.join(", ")),
+        };
+        match error {
+            ReadError::Missing(_) => Fault::Input(format!("there is no sweep `{name}`; {help}")),
+            ReadError::Unreadable { .. } => Fault::Documents(error.diagnostic().into()),
+        }
+    })
+}
+
+/// Names of the sweeps in `pipelines/sweeps/`.
+pub fn sweep_names(library: &Library) -> Vec<String> {
+    let name = |path: String| Some(path.strip_prefix(SWEEPS)?.trim_start_matches('/').strip_suffix(".ron")?.to_owned());
+    library.list(SWEEPS, "ron").into_iter().filter_map(name).collect()
 }
 
 /// Names of the scenes in `assets/`.

@@ -25,7 +25,7 @@ fn host_declarations(hosts: &HostNodes) -> Vec<HostDecl> {
 }
 
 /// A pipeline with the nodes that it can use.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Documents {
     library: Library,
     registry: Registry,
@@ -54,7 +54,11 @@ impl Documents {
         Self::with(self.library.clone(), registry, faults, &self.path)
     }
 
-    fn with(library: Library, registry: Registry, registry_faults: Diagnostics, path: &Path) -> Result<Self, Diagnostics> {
+    /// As [`Documents::load`], with nodes that are loaded already.
+    ///
+    /// # Errors
+    /// As [`Documents::load`].
+    pub fn with(library: Library, registry: Registry, registry_faults: Diagnostics, path: &Path) -> Result<Self, Diagnostics> {
         match Pipeline::load(&library, path) {
             Ok(pipeline) => Ok(Self { library, registry, registry_faults, pipeline, path: path.to_owned() }),
             // Faults of its meaning are told together with those of its text.

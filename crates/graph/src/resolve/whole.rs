@@ -3,7 +3,11 @@
 use std::collections::BTreeSet;
 
 use super::{LinkedNode, Linker, Wire, settable};
-use crate::{diagnostics::Diagnostic, pipeline::ResourceKind, registry::Direction, value::ParamKind};
+use crate::{
+    diagnostics::Diagnostic,
+    pipeline::{Pipeline, Preset, ResourceKind},
+    registry::Direction,
+};
 
 impl<'a> Linker<'a, '_> {
     pub(super) fn presets(&mut self, nodes: &[LinkedNode<'a>]) {
@@ -11,22 +15,10 @@ impl<'a> Linker<'a, '_> {
             if self.pipeline.gaps != crate::pipeline::Gaps::default() && settable(self.pipeline, nodes, name).is_err() {
                 continue;
             }
-            let kind = match self.settable(name, nodes) {
-                Ok(Some(kind)) => kind,
-                Ok(None) => continue,
-                Err((message, help)) => {
-                    self.push(Diagnostic::error(message, preset.name_span.clone()).help(help));
-                    continue;
-                }
-            };
-            if let Err(remedy) = kind.accept(&preset.value) {
-                self.push(Diagnostic::error(format!("{} is no value of `{name}`", preset.shown()), preset.span.clone()).help(remedy));
+            if let Some(fault) = preset_fault(self.pipeline, nodes, name, preset) {
+                self.push(fault);
             }
         }
-    }
-
-    pub(super) fn settable(&self, name: &str, nodes: &[LinkedNode<'a>]) -> Result<Option<&'a ParamKind>, (String, String)> {
-        settable(self.pipeline, nodes, name)
     }
 
     /// A resource that is read, but that no node writes under any condition.
@@ -90,5 +82,17 @@ impl<'a> Linker<'a, '_> {
                 }
             }
         }
+    }
+}
+
+/// What is wrong with a value that a document sets.
+pub(crate) fn preset_fault(pipeline: &Pipeline, nodes: &[LinkedNode<'_>], name: &str, preset: &Preset) -> Option<Diagnostic> {
+    match settable(pipeline, nodes, name) {
+        Ok(Some(kind)) => {
+            let remedy = kind.accept(&preset.value).err()?;
+            Some(Diagnostic::error(format!("{} is no value of `{name}`", preset.shown()), preset.span.clone()).help(remedy))
+        }
+        Ok(None) => None,
+        Err((message, help)) => Some(Diagnostic::error(message, preset.name_span.clone()).help(help)),
     }
 }

@@ -1,10 +1,12 @@
 //! The command line: subcommands, options and their help.
 
+mod lab;
 pub mod values;
 
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+pub use lab::{LabArgs, SweepArgs, TuneArgs};
 
 /// Many-light global illumination from render graphs written in RON.
 #[derive(Debug, Parser)]
@@ -27,7 +29,7 @@ const EXIT_CODES: &str = "Exit codes: 0 done, 1 the input is at fault, 2 usage, 
 pub enum Command {
     /// Render a scene with a pipeline and write pictures
     Render(RenderArgs),
-    /// Check pipelines, nodes and scenes without a GPU
+    /// Check pipelines, nodes, sweeps and scenes without a GPU
     Check(CheckArgs),
     /// List the nodes that pipelines can use, or describe one
     Nodes(NodesArgs),
@@ -41,6 +43,10 @@ pub enum Command {
     Watch(WatchArgs),
     /// Measure how far an image is from a reference
     Compare(CompareArgs),
+    /// Run many settings, and report what each costs and how far it is from the truth
+    Sweep(SweepArgs),
+    /// Find the best setting within a time, or the fastest within an error
+    Tune(TuneArgs),
     /// List the adapters (GPUs and software) of this machine
     Adapters(AdaptersArgs),
 }
@@ -139,7 +145,7 @@ pub struct RenderArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  manylight check\n  manylight check pipelines/acrsm.ron shaders/ism/splat.ron scenes/room.ron")]
 pub struct CheckArgs {
-    /// Pipelines, node declarations or scenes (.ron); without any: everything in the library
+    /// Pipelines, node declarations, sweeps or scenes (.ron); without any: everything in the library
     #[arg(value_name = "FILE")]
     pub files: Vec<PathBuf>,
 }

@@ -57,6 +57,38 @@ pub fn rate(text: &str) -> Result<f64, String> {
     }
 }
 
+/// `--shard I/N`: a part, from 1, and the number of parts.
+pub fn share(text: &str) -> Result<(usize, usize), String> {
+    let expected = "expected I/N, for example `1/4` for the first of four parts";
+    let (part, parts) = text.split_once('/').ok_or(expected)?;
+    let number = |text: &str| text.trim().parse::<usize>().map_err(|_| expected.to_owned());
+    let (part, parts) = (number(part)?, number(parts)?);
+    if (1..=parts).contains(&part) { Ok((part, parts)) } else { Err(format!("there is no part {part} of {parts}: {expected}")) }
+}
+
+/// `--budget 16ms`: milliseconds; also `0.1s` and `60fps`.
+pub fn milliseconds(text: &str) -> Result<f64, String> {
+    let expected = "expected a time above 0, for example `16ms`, `0.5s` or `60fps`";
+    let text = text.trim();
+    let split = text.find(|c: char| c.is_alphabetic()).ok_or(expected)?;
+    let value: f64 = text[..split].trim().parse().map_err(|_| expected.to_owned())?;
+    let milliseconds = match &text[split..] {
+        "ms" => value,
+        "s" => 1e3 * value,
+        "fps" => 1e3 / value,
+        _ => return Err(expected.to_owned()),
+    };
+    if milliseconds.is_finite() && milliseconds > 0.0 { Ok(milliseconds) } else { Err(expected.to_owned()) }
+}
+
+/// `--error 0.1`: at least 0.
+pub fn error(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
+        _ => Err("expected an error of at least 0, for example `0.1` for 10 % of the mean".to_owned()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -86,6 +118,26 @@ mod tests {
         for wrong in ["ism", "=x.exr", "ism="] {
             assert!(dump(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn shares() {
+        assert_eq!(share("1/1"), Ok((1, 1)));
+        assert_eq!(share("2 / 3"), Ok((2, 3)));
+        for wrong in ["0/2", "3/2", "1/0", "1", "a/b", "", "-1/2"] {
+            assert!(share(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn budgets() {
+        assert_eq!(milliseconds("16ms"), Ok(16.0));
+        assert_eq!(milliseconds("0.5 s"), Ok(500.0));
+        assert_eq!(milliseconds("50fps"), Ok(20.0));
+        for wrong in ["16", "0ms", "-1s", "0fps", "ms", "16 minutes", "1e999s", ""] {
+            assert!(milliseconds(wrong).is_err(), "{wrong}");
+        }
+        assert!(error("0.1") == Ok(0.1) && error("-0.1").is_err() && error("NaN").is_err());
     }
 
     #[test]

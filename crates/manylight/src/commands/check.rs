@@ -14,6 +14,7 @@ use manylight::{
         library::Library,
         registry::Registry,
     },
+    lab::sweep::Sweep,
     library, load_registry,
 };
 
@@ -72,6 +73,7 @@ enum Document {
     Pipeline,
     Stage,
     Node,
+    Sweep,
     Scene,
     Other(String),
 }
@@ -93,11 +95,37 @@ impl Checker {
             let place = loaded.library.root().map(|root| root.join(&path)).filter(|p| p.is_file()).unwrap_or_else(|| path.clone().into());
             self.pipeline(&loaded, &place);
         }
+        for name in library::sweep_names(&loaded.library) {
+            self.sweep(&loaded, &name);
+        }
     }
 
     fn pipeline(&mut self, loaded: &Loaded, path: &Path) {
         *self.counts.entry("pipeline").or_default() += 1;
         self.found.extend(check_file(&loaded.library, path, &loaded.registry));
+    }
+
+    /// Both sizes of a sweep, with the scenes that it names.
+    fn sweep(&mut self, loaded: &Loaded, name: &str) {
+        *self.counts.entry("sweep").or_default() += 1;
+        let source = match library::sweep(&loaded.library, name) {
+            Ok(source) => source,
+            Err(Fault::Documents(faults)) => return self.found.extend(faults),
+            Err(fault) => return self.found.push(Diagnostic::error_nowhere(fault.to_string())),
+        };
+        for small in [false, true] {
+            let faults = match Sweep::read(&source, small) {
+                Ok(sweep) => sweep.check(&loaded.library, &loaded.registry, &|scene| {
+                    library::scene(&loaded.library, scene).map_err(|fault| fault.to_string())
+                }),
+                Err(faults) => faults,
+            };
+            for fault in faults.0 {
+                if !self.found.0.contains(&fault) {
+                    self.found.push(fault);
+                }
+            }
+        }
     }
 
     fn file(&mut self, library: &Library, path: &Path) {
@@ -120,9 +148,10 @@ impl Checker {
         match document {
             Document::Node => self.node(&loaded, path),
             Document::Stage => self.stage(&loaded, path),
+            Document::Sweep => self.sweep(&loaded, &path.to_string_lossy()),
             Document::Other(name) => self.found.push(
                 Diagnostic::error_nowhere(format!("`{}` holds a `{name}`, which cannot be checked", path.display()))
-                    .help("files that can be checked hold a `Pipeline`, `Stage`, `Node` or `Scene`"),
+                    .help("files that can be checked hold a `Pipeline`, `Stage`, `Node`, `Sweep` or `Scene`"),
             ),
             _ => {
                 // Faults of nodes that the pipeline uses are its own.
@@ -195,6 +224,7 @@ fn kind_of(path: &Path) -> Result<Document, Diagnostic> {
         "Pipeline" | "" => Document::Pipeline,
         "Stage" => Document::Stage,
         "Node" => Document::Node,
+        "Sweep" => Document::Sweep,
         "Scene" => Document::Scene,
         _ => Document::Other(name),
     })

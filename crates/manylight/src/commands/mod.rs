@@ -8,8 +8,11 @@ pub mod graph;
 pub mod nodes;
 pub mod profile;
 pub mod render;
+pub mod sweep;
+pub mod tune;
 pub mod watch;
 
+mod lab;
 mod outputs;
 mod session;
 mod stats;
@@ -40,6 +43,8 @@ pub fn run(cli: &Cli) -> Result<(), Fault> {
         Command::Profile(args) => profile::run(cli, args),
         Command::Watch(args) => watch::run(cli, args),
         Command::Compare(args) => compare::run(args),
+        Command::Sweep(args) => sweep::run(cli, args),
+        Command::Tune(args) => tune::run(cli, args),
         Command::Adapters(args) => adapters::run(args),
     }
 }

@@ -1,0 +1,63 @@
+//! What a sweep's document gives to its report: tables of papers, curves of other renderers.
+
+use manylight_graph::ron::{Kind, Reader, Shape, Tree, suggest};
+
+use crate::sheet::{Axis, Curve, Paper};
+
+const PAPER: Shape = Shape { what: "a paper's table", required: &["source", "unit", "rows"], optional: &[] };
+const CURVE: Shape = Shape { what: "a curve", required: &["name", "scene", "metric", "points"], optional: &[] };
+
+pub(super) fn papers(reader: &mut Reader, tree: &Tree) -> Vec<Paper> {
+    reader.list(tree, "tables").iter().filter_map(|tree| paper(reader, tree)).collect()
+}
+
+fn paper(reader: &mut Reader, tree: &Tree) -> Option<Paper> {
+    let fields = reader.record(tree, &PAPER)?;
+    let text = |reader: &mut Reader, name: &str| fields.get(name).and_then(|t| reader.text(t, "a text in quotes")).map(|t| t.text);
+    let (source, unit) = (text(reader, "source"), text(reader, "unit"));
+    let mut values = Vec::new();
+    if let Some(tree) = fields.get("rows") {
+        for (row, tree) in reader.map(tree, "rows") {
+            for (column, tree) in reader.map(tree, "columns") {
+                if let Some(value) = reader.float(tree, "a number") {
+                    values.push((row.text.clone(), column.text, value));
+                }
+            }
+        }
+    }
+    Some(Paper { source: source?, unit: unit?, values })
+}
+
+pub(super) fn axis(reader: &mut Reader, tree: &Tree) -> Option<Axis> {
+    let text = reader.text(tree, "the name of a time in quotes")?.text;
+    let found = Axis::ALL.into_iter().find(|axis| axis.name() == text);
+    if found.is_none() {
+        reader.error(&tree.range, format!("there is no time `{text}`"), suggest(&text, Axis::ALL.iter().map(|axis| axis.name())));
+    }
+    found
+}
+
+pub(super) fn curves(reader: &mut Reader, tree: &Tree) -> Vec<Curve> {
+    reader.list(tree, "curves").iter().filter_map(|tree| curve(reader, tree)).collect()
+}
+
+fn curve(reader: &mut Reader, tree: &Tree) -> Option<Curve> {
+    let fields = reader.record(tree, &CURVE)?;
+    let text = |reader: &mut Reader, name: &str| fields.get(name).and_then(|t| reader.text(t, "a text in quotes")).map(|t| t.text);
+    let (name, scene, metric) = (text(reader, "name"), text(reader, "scene"), text(reader, "metric"));
+    let points = fields.get("points").map(|tree| reader.list(tree, "points").iter().filter_map(|tree| point(reader, tree)).collect());
+    Some(Curve { name: name?, scene: scene?, metric: metric?, points: points? })
+}
+
+fn point(reader: &mut Reader, tree: &Tree) -> Option<(f64, f64)> {
+    match &tree.kind {
+        Kind::Tuple(None, items) if items.len() == 2 => {
+            let (time, error) = (reader.float(&items[0], "milliseconds"), reader.float(&items[1], "an error"));
+            Some((time?, error?))
+        }
+        _ => {
+            reader.expected(tree, "a point", "write (milliseconds, error)");
+            None
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! What `sweep` and `tune` share: loading, progress, the files that they write.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use etcetera::BaseStrategy;
+use indicatif::ProgressBar;
+use manylight::{
+    fault::Fault,
+    files::write_text,
+    graph::library::Library,
+    lab::{
+        metrics::Known,
+        record::Record,
+        report,
+        sheet::Sheet,
+        sweep::{Event, Options, Outcome, Prepared, Sweep, SweepError, execute, prepare},
+    },
+    library,
+};
+
+use super::{note, of_file};
+use crate::{cli::LabArgs, progress};
+
+/// The cache folder given, or `manylight/NAME` in the user's.
+pub fn cache(given: Option<&PathBuf>, name: &str) -> Result<PathBuf, Fault> {
+    if let Some(folder) = given {
+        return Ok(folder.clone());
+    }
+    let strategy = etcetera::choose_base_strategy();
+    strategy
+        .map(|s| s.cache_dir().join("manylight").join(name))
+        .map_err(|e| Fault::Input(format!("there is no cache folder ({e}); name one with --cache or --records")))
+}
+
+/// Loads everything that a sweep names.
+pub fn load(sweep: Sweep, library: &Library) -> Result<Prepared, Fault> {
+    prepare(sweep, library, &|name| library::scene(library, name).map_err(|fault| fault.to_string())).map_err(of_sweep)
+}
+
+/// Does the runs and tells what happens.
+pub fn run(prepared: &Prepared, out: &Path, shard: Option<(usize, usize)>, args: &LabArgs) -> Result<Outcome, Fault> {
+    let cache = cache(args.cache.as_ref(), "references")?;
+    let gpu = super::open_gpu(args.adapter.as_ref())?;
+    note(&format!("adapter: {}", super::adapter_line(&gpu)));
+    let mut teller = Teller { bar: progress::spinner("starting"), metric: prepared.sweep.metric.text.clone() };
+    let outcome = execute(&gpu, prepared, Options { out, cache: &cache, shard }, &mut |event| teller.tell(&event)).map_err(of_sweep)?;
+    teller.bar.finish_and_clear();
+    Ok(outcome)
+}
+
+/// Tells what happens: a line a run, and between them on a terminal what is under way.
+struct Teller {
+    bar: ProgressBar,
+    metric: String,
+}
+
+impl Teller {
+    fn tell(&mut self, event: &Event<'_>) {
+        match event {
+            Event::Damaged(damage) => self.line(&format!("{damage}; its run is done again")),
+            Event::Start { run, index, of, kept, left } => {
+                if *index == 0 && *kept > 0 {
+                    self.line(&format!("{kept} runs are done already"));
+                }
+                let left = left.map(|left| format!(", {} left", in_words(left))).unwrap_or_default();
+                self.bar.set_message(format!("{}/{of} {}{left}", index + 1, run.name));
+            }
+            Event::Reference { run, done, of } => self.bar.set_message(format!("reference of {}: batch {done} of {of}", run.name)),
+            Event::Done { record, index, of } => {
+                let error = record.metrics.get(&self.metric).map_or("undefined".to_owned(), |value| format!("{value:.4}"));
+                let title = Known::find(&self.metric).map_or(self.metric.as_str(), |known| known.title);
+                let time = record.times.frame();
+                self.line(&format!("[{}/{of}] {}: {title} {error}, {time:.1} ms a frame", index + 1, record.run));
+            }
+            Event::Failed { run, reason } => self.line(&format!("failed: {}\n{reason}", run.name)),
+        }
+    }
+
+    fn line(&self, text: &str) {
+        self.bar.suspend(|| note(text));
+    }
+}
+
+fn in_words(time: Duration) -> String {
+    let seconds = time.as_secs();
+    if seconds < 90 { format!("{seconds} s") } else { format!("{} min", (seconds + 30) / 60) }
+}
+
+/// What the report says besides the records.
+pub fn sheet(sweep: &Sweep) -> Sheet {
+    Sheet {
+        name: sweep.name.clone(),
+        doc: sweep.doc.clone(),
+        axis: sweep.axis,
+        metric: sweep.metric.text.clone(),
+        metrics: sweep.metrics.iter().map(|metric| metric.text.clone()).collect(),
+        papers: sweep.papers.clone(),
+        curves: sweep.curves.clone(),
+    }
+}
+
+/// Writes table and report beside the records; returns the report's path.
+pub fn write_report(sweep: &Sweep, records: &[Record], out: &Path) -> Result<PathBuf, Fault> {
+    write_text(&out.join("runs.csv"), &report::csv(records)).map_err(of_file)?;
+    let page = report::html(&sheet(sweep), records, &|name| fs::read(out.join(name)).ok());
+    let file = out.join("report.html");
+    write_text(&file, &page).map_err(of_file)?;
+    Ok(file)
+}
+
+pub fn of_sweep(error: SweepError) -> Fault {
+    match error {
+        SweepError::Documents(diagnostics) => Fault::Documents(diagnostics),
+        other => Fault::Input(other.to_string()),
+    }
+}

@@ -1,0 +1,83 @@
+//! `manylight sweep`: many runs, their records and their report.
+
+use manylight::{
+    fault::Fault,
+    graph::{
+        Spanned,
+        diagnostics::{Severity, Span},
+        library::Library,
+    },
+    lab::sweep::{Event, Outcome, SceneUse, Sweep, collect},
+    library,
+};
+
+use super::{lab, note, of_file};
+use crate::cli::{Cli, SweepArgs};
+
+/// Runs what has not been run, then reports.
+pub fn run(cli: &Cli, args: &SweepArgs) -> Result<(), Fault> {
+    let library = library::open(cli.root.as_deref())?;
+    let sweep = read(&library, args)?;
+    if args.report {
+        return report(&library, &sweep, args);
+    }
+    let prepared = lab::load(sweep, &library)?;
+    if args.list {
+        let lines: String = prepared.runs.iter().map(|run| format!("{}\n", run.name)).collect();
+        return super::print(&lines);
+    }
+    let Outcome { records, kept, failed, missing } = lab::run(&prepared, &args.out, args.shard, &args.lab)?;
+    let report = lab::write_report(&prepared.sweep, &records, &args.out)?;
+    let total = prepared.runs.len();
+    super::print(&format!("{} of {total} runs have records ({kept} were there already): {}\n", records.len(), report.display()))?;
+    match (failed, missing) {
+        (0, 0) => Ok(()),
+        (0, missing) => {
+            note(&format!("{missing} runs are still to be done: run the other parts, then the same command without --shard"));
+            Ok(())
+        }
+        (failed, _) => Err(Fault::Input(format!("{failed} runs failed; the others are kept"))),
+    }
+}
+
+/// The sweep with what the command line changes of it.
+fn read(library: &Library, args: &SweepArgs) -> Result<Sweep, Fault> {
+    let mut sweep = Sweep::read(&library::sweep(library, &args.sweep)?, args.lab.small)?;
+    let given = |text: String| Spanned { text, span: Span::new(&sweep.source, 0..0) };
+    if args.reference.is_some() && args.scene.len() != 1 {
+        return Err(Fault::Usage("--reference is the reference of one scene: give --scene once".to_owned()));
+    }
+    let mut scenes = Vec::new();
+    for scene in &args.scene {
+        // Told here if it is not there: the sweep's document is not at fault.
+        library::scene(library, scene)?;
+        let path = |file: &std::path::PathBuf| given(file.to_string_lossy().into_owned());
+        let (reference, standard_error) = (args.reference.as_ref().map(path), args.standard_error.as_ref().map(path));
+        scenes.push(SceneUse { scene: given(scene.clone()), reference, standard_error });
+    }
+    if !scenes.is_empty() {
+        sweep.scenes = scenes;
+    }
+    if let Some(size) = args.lab.size {
+        sweep.sizes = vec![size];
+    }
+    Ok(sweep)
+}
+
+/// Table and report of the records that are there.
+fn report(library: &Library, sweep: &Sweep, args: &SweepArgs) -> Result<(), Fault> {
+    let (registry, _) = manylight::load_registry(library);
+    let faults = sweep.check(library, &registry, &|scene| library::scene(library, scene).map_err(|fault| fault.to_string()));
+    if faults.0.iter().any(|fault| fault.severity == Severity::Error) {
+        return Err(faults.into());
+    }
+    let runs = sweep.runs();
+    let records = collect(&args.out, &runs, &mut |event| {
+        if let Event::Damaged(damage) = event {
+            note(&damage.to_string());
+        }
+    })
+    .map_err(of_file)?;
+    let file = lab::write_report(sweep, &records, &args.out)?;
+    super::print(&format!("{} of {} runs have records: {}\n", records.len(), runs.len(), file.display()))
+}

@@ -1,0 +1,224 @@
+//! Sweeps: what is done is kept, parts make a whole, faults are told at their place, and those of the papers run.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::Path,
+    process::Stdio,
+    time::{Duration, Instant},
+};
+
+use manylight::lab::record::{self, Record};
+
+use crate::support::{command, manylight, root};
+
+/// Five runs, each well below a second.
+const SWEEP: &str = r#"Sweep(
+    doc: "Does it matter?",
+    variants: {
+        "simple": (pipeline: "acrsm", set: {"visibility": "simple", "rsm_size": 64, "ism_size": 32, "atlas_width": 256}),
+        "none": (pipeline: "acrsm", set: {"visibility": "none", "rsm_size": 64}, vary: [{"tiles": [1]}]),
+    },
+    vary: [{"clusters": [16, 32]}, {"tiles": [1, 2]}],
+    scenes: ["cornell"],
+    sizes: [(32, 24)],
+    frames: 3,
+    measure: 2,
+    reference: (paths: 16),
+)"#;
+
+/// A sweep's document in a folder of its own.
+fn with_sweep(text: &str) -> (tempfile::TempDir, String) {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let file = folder.path().join("small.ron");
+    fs::write(&file, text).expect("writable");
+    let file = file.to_string_lossy().into_owned();
+    (folder, file)
+}
+
+fn path(folder: &Path, name: &str) -> String {
+    folder.join(name).to_string_lossy().into_owned()
+}
+
+/// Everything but when it was done and how long it took.
+fn timeless(folder: &Path) -> Vec<Record> {
+    let (mut records, damaged) = record::read(&folder.join("records.jsonl")).expect("readable");
+    assert!(damaged.is_empty(), "{damaged:?}");
+    for record in &mut records {
+        record.date.clear();
+        let times = &mut record.times;
+        for summary in [Some(&mut times.wall), times.gpu.as_mut(), times.cpu.as_mut()].into_iter().flatten() {
+            (summary.median, summary.p95) = (0.0, 0.0);
+        }
+        times.until_picture = 0.0;
+        times.nodes.iter_mut().for_each(|node| (node.median, node.p95) = (0.0, 0.0));
+    }
+    records
+}
+
+#[test]
+fn a_stopped_sweep_and_one_in_parts_give_the_records_of_one_that_ran_through() {
+    let (folder, file) = with_sweep(SWEEP);
+    let out = |name: &str| path(folder.path(), name);
+    let cache = out("cache");
+    let sweep = |name: &str, more: &[&str]| manylight(&[&["sweep", &file, "--out", &out(name), "--cache", &cache], more].concat());
+    sweep("whole", &[]).expect(0).says(&["6 of 6 runs have records"]);
+    let whole = timeless(&folder.path().join("whole"));
+    assert_eq!(whole.iter().map(|r| &r.run).collect::<BTreeSet<_>>().len(), 6);
+    assert!(whole.iter().all(|r| r.metrics.contains_key("relative_mean_absolute_error") && r.pictures.error.is_some()));
+
+    // Killed as soon as something is on the disk, then started again.
+    let stopped = folder.path().join("stopped");
+    let mut child = command(&["sweep", &file, "--out", &out("stopped"), "--cache", &cache])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    let start = Instant::now();
+    let lines = || fs::read_to_string(stopped.join("records.jsonl")).map_or(0, |text| text.lines().count());
+    while lines() < 2 && start.elapsed() < Duration::from_secs(120) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().expect("running");
+    child.wait().expect("ended");
+    let kept = lines();
+    assert!((2..6).contains(&kept), "{kept} records when it was killed");
+    // As if it had been killed in the middle of a write.
+    let text = fs::read_to_string(stopped.join("records.jsonl")).expect("readable");
+    fs::write(stopped.join("records.jsonl"), format!("{text}{}", &text[..100])).expect("writable");
+    let kept = format!("({} were there already)", text.lines().count());
+    sweep("stopped", &[]).expect(0).says(&[&format!("records.jsonl:{}", text.lines().count() + 1), "done again", &kept]);
+    assert_eq!(timeless(&stopped), whole);
+
+    // Two parts in one folder.
+    sweep("parts", &["--shard", "2/2"]).expect(0).says(&["3 of 6 runs", "3 runs are still to be done"]);
+    sweep("parts", &["--shard", "1/2"]).expect(0).says(&["6 of 6 runs"]);
+    sweep("parts", &["--report"]).expect(0).says(&["6 of 6 runs"]);
+    let mut parts = timeless_parts(&folder.path().join("parts"));
+    parts.sort_by_key(|r| whole.iter().position(|w| w.run == r.run));
+    assert_eq!(parts, whole);
+
+    // A damaged line is told, and its run alone is done again.
+    let records = folder.path().join("whole/records.jsonl");
+    let text = fs::read_to_string(&records).expect("readable");
+    let damaged: Vec<String> =
+        text.lines().enumerate().map(|(i, l)| if i == 2 { l.replace("\"rmse\"", "\"rm") } else { l.to_owned() }).collect();
+    fs::write(&records, damaged.join("\n") + "\n").expect("writable");
+    sweep("whole", &[]).expect(0).says(&["records.jsonl:3", "(5 were there already)"]);
+    assert_eq!(timeless(&folder.path().join("whole")), whole);
+    let html = fs::read_to_string(folder.path().join("whole/report.html")).expect("readable");
+    assert!(!html.contains("http://") || !html.contains("src=\"http"), "the report must not need a network");
+}
+
+fn timeless_parts(folder: &Path) -> Vec<Record> {
+    let all: String = ["records-1-of-2.jsonl", "records-2-of-2.jsonl"]
+        .iter()
+        .map(|name| fs::read_to_string(folder.join(name)).expect("readable"))
+        .collect();
+    fs::write(folder.join("records.jsonl"), all).expect("writable");
+    timeless(folder)
+}
+
+#[test]
+fn faults_of_sweeps_are_told_at_their_place() {
+    let (folder, _) = with_sweep("");
+    let out = path(folder.path(), "out");
+    let fault = |text: &str, says: &[&str]| {
+        let (_folder, file) = with_sweep(text);
+        manylight(&["sweep", &file, "--out", &out]).expect(1).says(says);
+        manylight(&["check", &file]).expect(1).says(says);
+    };
+    let good = |variant: &str, more: &str| format!("Sweep(doc: \"?\", variants: {{ {variant} }}, scenes: [\"cornell\"]{more})");
+    fault("", &["small.ron"]);
+    fault(&good("", ""), &["no variants", "small.ron:1"]);
+    fault(&good("\"a\": (pipeline: \"acrms\")", ""), &["acrms", "did you mean `acrsm`"]);
+    fault(
+        &good("\"a\": (pipeline: \"acrsm\", set: {\"cluster\": 64})", ""),
+        &["no parameter `cluster`", "did you mean `clusters`", "small.ron:1"],
+    );
+    fault(&good("\"a\": (pipeline: \"acrsm\", set: {\"clusters\": 5})", ""), &["5 is no value of `clusters`", "16"]);
+    fault(
+        &good("\"a\": (pipeline: \"acrsm\")", ", vary: [{\"visibility\": [\"pcss\", \"pcs\"]}]"),
+        &["\"pcs\" is no value", "did you mean `pcss`"],
+    );
+    fault(
+        &good("\"a\": (pipeline: \"acrsm\")", ", vary: [{\"clusters\": [16, 32], \"tiles\": [1]}]"),
+        &["`clusters` has 2 values, `tiles` has 1"],
+    );
+    fault(&good("\"a\": (pipeline: \"acrsm\")", ", vary: [{\"clusters\": []}]"), &["there are no values"]);
+    fault(&good("\"a\": (pipeline: \"acrsm\")", ", vary: [{\"clusters\": [16, 16]}]"), &["would be done 2 times"]);
+    fault(&good("\"a\": (pipeline: \"acrsm\")", ", image: \"indirec\""), &["no texture `indirec`", "did you mean `indirect`"]);
+    fault(&good("\"a\": (pipeline: \"acrsm\")", ", metric: \"flipp\""), &["no metric `flipp`", "did you mean `flip`"]);
+    fault(&good("\"a\": (pipeline: \"acrsm\")", ", reference: (component: \"one\")"), &["no component `one`"]);
+    fault(&good("\"a\": (pipeline: \"acrsm\")", ", frames: 0"), &["0 is out of range"]);
+    fault(
+        "Sweep(doc: \"?\", variants: {\"a\": (pipeline: \"acrsm\")}, scenes: [\"cornel\"])",
+        &["no scene `cornel`", "did you mean `cornell`"],
+    );
+    manylight(&["sweep", "val-counts", "--out", &out]).expect(1).says(&["no sweep `val-counts`", "did you mean `val-count`"]);
+    manylight(&["sweep", "val-count", "--out", &out, "--shard", "3/2"]).expect(2);
+    assert!(!Path::new(&out).exists(), "nothing was run, nothing may be written");
+}
+
+#[test]
+fn references_on_disk_must_fit() {
+    let (folder, file) = with_sweep(SWEEP);
+    let out = path(folder.path(), "out");
+    let reference = root().join("tests/data/cornell_blocks/onebounce.exr").to_string_lossy().into_owned();
+    let sweep = |more: &[&str]| manylight(&[&["sweep", &file, "--out", &out, "--scene", "cornell"], more].concat());
+    sweep(&["--reference", &reference]).expect(1).says(&["onebounce.exr", "256×256", "32×24"]);
+    sweep(&["--reference", "nowhere.exr"]).expect(1).says(&["nowhere.exr"]);
+    sweep(&["--reference", &reference, "--scene", "moving"]).expect(2).says(&["--scene once"]);
+}
+
+/// Every sweep of `pipelines/sweeps`, in its small size.
+#[test]
+fn the_sweeps_of_the_papers_run() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let cache = path(folder.path(), "cache");
+    let mut names: Vec<_> = fs::read_dir(root().join("pipelines/sweeps"))
+        .expect("readable")
+        .map(|entry| entry.expect("entry").path().file_stem().expect("a name").to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    assert!(names.len() >= 10, "{names:?}");
+    for name in names {
+        let out = folder.path().join(&name);
+        let start = Instant::now();
+        manylight(&["sweep", &name, "--small", "--out", &out.to_string_lossy(), "--cache", &cache]).expect(0);
+        let (records, damaged) = record::read(&out.join("records.jsonl")).expect("readable");
+        println!("{name}: {} runs in {:.1} s", records.len(), start.elapsed().as_secs_f64());
+        assert!(damaged.is_empty() && records.len() >= 2, "{name}");
+        for record in &records {
+            let error = record.metrics.get("relative_rmse").copied().unwrap_or(f64::NAN);
+            assert!(error.is_finite() && error > 0.0, "{name}, {}: {error}", record.run);
+            assert!(record.times.frame() > 0.0 && !record.times.nodes.is_empty(), "{name}, {}", record.run);
+        }
+        assert!(fs::read_to_string(out.join("report.html")).expect("readable").contains(&records[0].variant), "{name}");
+    }
+}
+
+#[test]
+fn a_tuned_preset_renders() {
+    let (folder, file) = with_sweep(SWEEP);
+    let at = |name: &str| path(folder.path(), name);
+    let tune = |more: &[&str]| {
+        let own = ["tune", "acrsm", "--scene", "cornell", "--sweep", &file, "--records", &at("records"), "--cache", &at("cache")];
+        manylight(&[&own, more].concat())
+    };
+    tune(&["--error", "1e9", "--out", &at("fast.ron")]).expect(0).says(&["ms a frame", "fast.ron"]);
+    let (records, _) = record::read(&folder.path().join("records/records.jsonl")).expect("readable");
+    let fastest = records.iter().min_by(|a, b| a.times.frame().total_cmp(&b.times.frame())).expect("records");
+    let preset = fs::read_to_string(folder.path().join("fast.ron")).expect("readable");
+    for (name, value) in &fastest.set {
+        assert!(
+            preset.contains(&format!("\"{name}\": {value}")) || preset.contains(&format!("\"{name}\": \"{value}\"")),
+            "{name} in {preset}"
+        );
+    }
+    tune(&["--budget", "1000s", "--out", &at("good.ron")]).expect(0);
+    manylight(&["check", &at("good.ron")]).expect(0);
+    manylight(&["render", &at("good.ron"), "--scene", "cornell", "--size", "32x24", "--frames", "2", "--out", &at("x.png")]).expect(0);
+    tune(&["--error", "1e-9", "--out", &at("no.ron")]).expect(1).says(&["the most accurate setting"]);
+    assert!(!folder.path().join("no.ron").exists());
+}
