@@ -3,7 +3,7 @@
 //! It uses nothing but the standard library, so that it is built in a second and runs on a machine that has Rust and nothing else.
 //!
 //! - [`shell`]: running other programs
-//! - [`setup`], [`vulkan`], [`packages`]: finding or installing a Vulkan driver
+//! - [`setup`], [`vulkan`], [`packages`]: finding or installing a C++ compiler and a Vulkan driver
 //! - [`demo`]: the first picture
 //! - [`test`]: everything continuous integration checks; [`package`] is one of its steps
 //! - [`docs`], [`links`]: the node reference and the book
@@ -32,7 +32,7 @@ Commands:
                                    --quick leaves out doc tests, documentation, demo, licences and packages
   docs [--check]                   write the node reference into docs/src/nodes and build the book;
                                    --check changes nothing and fails when the reference is stale
-  setup [--software]               make sure that there is a usable Vulkan driver;
+  setup [--software]               make sure that there are a C++ compiler and a usable Vulkan driver;
                                    --software installs the software driver even beside a hardware one
 
 Exit codes: 0 done, 1 a check failed, 2 usage, 3 no usable Vulkan driver (the command that installs one is printed).

@@ -1,4 +1,13 @@
-//! How each system's package manager installs software Vulkan.
+//! How each system's package manager installs what is needed.
+
+/// What can be missing on Linux.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Need {
+    /// The Vulkan loader and Mesa's software driver.
+    Vulkan,
+    /// A C++ compiler: FLIP is C++.
+    Compiler,
+}
 
 /// A package manager.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,19 +54,22 @@ impl Manager {
         Self::ALL.into_iter().find(|m| has(m.program()))
     }
 
-    /// Packages of the Vulkan loader and of Mesa's software driver.
-    pub fn packages(self) -> &'static [&'static str] {
-        match self {
-            Self::Apt => &["libvulkan1", "mesa-vulkan-drivers"],
-            Self::Dnf => &["vulkan-loader", "mesa-vulkan-drivers"],
-            Self::Zypper => &["libvulkan1", "libvulkan_lvp"],
-            Self::Pacman => &["vulkan-icd-loader", "vulkan-swrast"],
-            Self::Apk => &["vulkan-loader", "mesa-vulkan-swrast"],
+    /// The packages that hold it.
+    pub fn packages(self, need: Need) -> &'static [&'static str] {
+        match (need, self) {
+            (Need::Vulkan, Self::Apt) => &["libvulkan1", "mesa-vulkan-drivers"],
+            (Need::Vulkan, Self::Dnf) => &["vulkan-loader", "mesa-vulkan-drivers"],
+            (Need::Vulkan, Self::Zypper) => &["libvulkan1", "libvulkan_lvp"],
+            (Need::Vulkan, Self::Pacman) => &["vulkan-icd-loader", "vulkan-swrast"],
+            (Need::Vulkan, Self::Apk) => &["vulkan-loader", "mesa-vulkan-swrast"],
+            (Need::Compiler, Self::Apt | Self::Apk) => &["g++"],
+            (Need::Compiler, Self::Dnf | Self::Zypper) => &["gcc-c++"],
+            (Need::Compiler, Self::Pacman) => &["gcc"],
         }
     }
 
     /// The commands that install them, in order, as root.
-    pub fn commands(self) -> Vec<Vec<&'static str>> {
+    pub fn commands(self, need: Need) -> Vec<Vec<&'static str>> {
         let mut commands: Vec<Vec<&'static str>> = match self {
             Self::Apt => {
                 vec![
@@ -71,21 +83,21 @@ impl Manager {
             Self::Apk => vec![vec!["apk", "add"]],
         };
         if let Some(last) = commands.last_mut() {
-            last.extend(self.packages());
+            last.extend(self.packages(need));
         }
         commands
     }
 
     /// The commands as run with that right: without a password or not at all.
-    pub fn commands_with(self, right: Right) -> Vec<Vec<&'static str>> {
+    pub fn commands_with(self, need: Need, right: Right) -> Vec<Vec<&'static str>> {
         let prefix: &[&'static str] = if right == Right::Sudo { &["sudo", "-n"] } else { &[] };
-        self.commands().into_iter().map(|c| [prefix, c.as_slice()].concat()).collect()
+        self.commands(need).into_iter().map(|c| [prefix, c.as_slice()].concat()).collect()
     }
 
     /// One line for the user to paste into a terminal.
-    pub fn line(self, right: Right) -> String {
+    pub fn line(self, need: Need, right: Right) -> String {
         let sudo = if right == Right::Root { "" } else { "sudo " };
-        let commands: Vec<String> = self.commands().iter().map(|c| format!("{sudo}{}", c.join(" "))).collect();
+        let commands: Vec<String> = self.commands(need).iter().map(|c| format!("{sudo}{}", c.join(" "))).collect();
         commands.join(" && ")
     }
 }
@@ -104,14 +116,14 @@ mod tests {
     #[test]
     fn root_runs_apt_as_it_is() {
         assert_eq!(
-            Manager::Apt.line(Right::Root),
+            Manager::Apt.line(Need::Vulkan, Right::Root),
             "apt-get update && env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends libvulkan1 mesa-vulkan-drivers"
         );
     }
 
     #[test]
     fn sudo_is_put_before_every_command_and_never_asks() {
-        let commands = Manager::Apt.commands_with(Right::Sudo);
+        let commands = Manager::Apt.commands_with(Need::Compiler, Right::Sudo);
         assert_eq!(commands.len(), 2);
         assert!(commands.iter().all(|c| c.starts_with(&["sudo", "-n"])));
     }
@@ -119,9 +131,11 @@ mod tests {
     #[test]
     fn the_line_for_the_user_has_sudo_unless_they_are_root() {
         for manager in Manager::ALL {
-            assert!(manager.line(Right::None).split(" && ").all(|c| c.starts_with("sudo ")), "{manager:?}");
-            assert!(!manager.line(Right::Root).contains("sudo"), "{manager:?}");
-            assert!(manager.packages().iter().all(|p| manager.line(Right::None).contains(p)), "{manager:?}");
+            for need in [Need::Vulkan, Need::Compiler] {
+                assert!(manager.line(need, Right::None).split(" && ").all(|c| c.starts_with("sudo ")), "{manager:?}");
+                assert!(!manager.line(need, Right::Root).contains("sudo"), "{manager:?}");
+                assert!(manager.packages(need).iter().all(|p| manager.line(need, Right::None).contains(p)), "{manager:?}");
+            }
         }
     }
 }

@@ -289,10 +289,27 @@ pub struct WatchArgs {
     pub pictures: Option<u32>,
 }
 
+/// What an error map shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ErrorMapArg {
+    /// Image less reference: blue where the image is darker, red where it is brighter
+    Difference,
+    /// The magnitude of that, from black to pale yellow
+    Absolute,
+    /// Relative to the reference, dark pixels counting as a tenth of its mean
+    Relative,
+    /// How visible the difference is
+    Flip,
+}
+
 /// `manylight compare`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  manylight compare picture.exr reference.exr\n  \
-    manylight compare normal.exr gbuffer.exr --reference-layer normal --format json")]
+    manylight compare normal.exr gbuffer.exr --reference-layer normal --format json\n  \
+    manylight compare picture.exr reference.exr --error-map error.png --error-map-kind flip\n  \
+    manylight compare picture.exr reference.exr --mask depth.exr --mask-below 10\n  \
+    manylight compare truth.exr reference.exr --standard-error error.exr \\\n      \
+    --reference-standard-error reference_stderr.exr --reference-batches 12")]
 pub struct CompareArgs {
     /// The image: .exr (linear values) or .png (display values)
     pub image: PathBuf,
@@ -304,9 +321,72 @@ pub struct CompareArgs {
     /// Layer of the reference
     #[arg(long, value_name = "NAME")]
     pub reference_layer: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub mask: MaskArgs,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub map: ErrorMapArgs,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub noise: NoiseArgs,
     /// How to print
     #[arg(long, value_enum, default_value = "text")]
     pub format: TextOrJson,
+}
+
+/// Which pixels count.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Which pixels count")]
+#[group(id = "mask_options")]
+pub struct MaskArgs {
+    /// Count only pixels where this picture is above or below a threshold (of several channels: their mean)
+    #[arg(long, value_name = "FILE", requires = "threshold")]
+    pub mask: Option<PathBuf>,
+    /// Layer of the mask
+    #[arg(long, value_name = "NAME", requires = "mask")]
+    pub mask_layer: Option<String>,
+    /// Pixels count where the mask is above this
+    #[arg(long, value_name = "X", requires = "mask", group = "threshold", value_parser = values::finite, allow_negative_numbers = true)]
+    pub mask_above: Option<f32>,
+    /// Pixels count where the mask is below this
+    #[arg(long, value_name = "X", requires = "mask", group = "threshold", value_parser = values::finite, allow_negative_numbers = true)]
+    pub mask_below: Option<f32>,
+}
+
+/// The picture of the error.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Error map")]
+#[group(id = "error_map_options")]
+pub struct ErrorMapArgs {
+    /// Write a map of the error: .png in colours, .exr as numbers
+    #[arg(long, value_name = "FILE")]
+    pub error_map: Option<PathBuf>,
+    /// What the map shows [default: difference]
+    #[arg(long, value_enum, value_name = "KIND", requires = "error_map")]
+    pub error_map_kind: Option<ErrorMapArg>,
+    /// Value at the end of the map's colours [default: half of the reference's mean; relative 0.5; flip 1]
+    #[arg(long, value_name = "X", requires = "error_map", value_parser = values::positive)]
+    pub error_map_range: Option<f32>,
+}
+
+/// What is known about noise.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Test against noise")]
+#[group(id = "noise_options")]
+pub struct NoiseArgs {
+    /// Standard error of every pixel of the image (.exr): tests whether noise explains the difference
+    #[arg(long, value_name = "FILE")]
+    pub standard_error: Option<PathBuf>,
+    /// Batches that it is from; by default its alpha channel, without one it counts as exact
+    #[arg(long, value_name = "N", requires = "standard_error", value_parser = clap::value_parser!(u32).range(2..))]
+    pub batches: Option<u32>,
+    /// Standard error of every pixel of the reference (.exr)
+    #[arg(long, value_name = "FILE")]
+    pub reference_standard_error: Option<PathBuf>,
+    /// Batches that it is from; by default its alpha channel, without one it counts as exact
+    #[arg(long, value_name = "N", requires = "reference_standard_error", value_parser = clap::value_parser!(u32).range(2..))]
+    pub reference_batches: Option<u32>,
 }
 
 /// `manylight adapters`.

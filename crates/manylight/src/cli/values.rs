@@ -89,6 +89,19 @@ pub fn error(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A finite number.
+pub fn finite(text: &str) -> Result<f32, String> {
+    match text.trim().parse::<f32>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("expected a number, for example `0.5`".to_owned()),
+    }
+}
+
+/// A finite number above zero.
+pub fn positive(text: &str) -> Result<f32, String> {
+    finite(text).ok().filter(|value| *value > 0.0).ok_or_else(|| "expected a number above 0, for example `0.5`".to_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -142,8 +155,12 @@ mod tests {
 
     #[test]
     fn times() {
+
+    fn numbers() {
         assert_eq!(seconds("-1.5"), Ok(-1.5));
         assert!(seconds("NaN").is_err() && seconds("inf").is_err() && seconds("soon").is_err());
+        assert!(finite("-0.5") == Ok(-0.5) && finite("NaN").is_err() && finite("1e99").is_err());
+        assert!(positive("0.5") == Ok(0.5) && positive("0").is_err());
         assert!(rate("0").is_err() && rate("-30").is_err() && rate("30").is_ok());
     }
 }
