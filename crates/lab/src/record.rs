@@ -120,9 +120,14 @@ pub struct Times {
 }
 
 impl Times {
-    /// The time of a frame: the GPU's where it has timestamps and is one, else until it was done.
+    /// The time of a frame: the median of [`Times::frame_summary`].
     pub fn frame(&self) -> f64 {
-        self.gpu.as_ref().filter(|_| !self.software).map_or(self.wall.median, |gpu| gpu.median)
+        self.frame_summary().median
+    }
+
+    /// Measurements of a frame: the GPU's where it has timestamps and is one, else until it was done.
+    pub fn frame_summary(&self) -> &Summary {
+        self.gpu.as_ref().filter(|_| !self.software).unwrap_or(&self.wall)
     }
 
     /// Sum of the medians of each stage's nodes, in the order of their first nodes.
