@@ -12,14 +12,16 @@
 //!
 //! - [`files`]: EXR and PNG files, written whole or not at all; [`tone`]: from numbers to bytes to look at.
 //! - [`metrics`]: how far a picture is from a reference.
-//! - [`sweep`]: many runs of pipelines, from one document.
-//! - [`record`]: what a run cost and how far it is off, as JSON Lines; [`sheet`]: how a report shows them.
+//! - [`sweep`]: many runs of pipelines, from one document; [`tune`]: the setting to use.
+//! - [`record`]: what a run cost and how far it is off, as JSON Lines; [`sheet`]: how a report shows them; [`report`]: reports as HTML, Markdown
+//!   and CSV.
 //! - [`timing`]: times of frames and nodes; [`facts`]: adapter and parameters as JSON.
 
 pub mod facts;
 pub mod files;
 pub mod metrics;
 pub mod record;
+pub mod report;
 pub mod sheet;
 pub mod sweep;
 pub mod timing;

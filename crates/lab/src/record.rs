@@ -121,9 +121,14 @@ pub struct Times {
 }
 
 impl Times {
-    /// The time of a frame: the GPU's where it has timestamps and is one, else until it was done.
+    /// The time of a frame: the median of [`Times::frame_summary`].
     pub fn frame(&self) -> f64 {
-        self.gpu.as_ref().filter(|_| !self.software).map_or(self.wall.median, |gpu| gpu.median)
+        self.frame_summary().median
+    }
+
+    /// Measurements of a frame: the GPU's where it has timestamps and is one, else until it was done.
+    pub fn frame_summary(&self) -> &Summary {
+        self.gpu.as_ref().filter(|_| !self.software).unwrap_or(&self.wall)
     }
 
     /// The time that an axis shows.

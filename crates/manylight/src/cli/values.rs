@@ -154,8 +154,6 @@ mod tests {
     }
 
     #[test]
-    fn times() {
-
     fn numbers() {
         assert_eq!(seconds("-1.5"), Ok(-1.5));
         assert!(seconds("NaN").is_err() && seconds("inf").is_err() && seconds("soon").is_err());
