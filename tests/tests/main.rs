@@ -4,6 +4,7 @@
 mod cli;
 mod clustering;
 mod determinism;
+mod metrics;
 mod moving_light;
 mod path_tracer;
 mod reference;
