@@ -45,7 +45,7 @@ pub fn markdown(sheet: &Sheet, records: &[Record]) -> BookPage {
         page.paragraph(&format!("## {}", escape(&group.title())));
         page.figure(sheet, &figures::scatter(&study, group));
         page.paragraph(tables::runs(&study, group, &metrics).markdown().trim_end());
-        page.paragraph(tables::FRONT);
+        page.paragraph(&escape(&tables::front_note(&study)));
         for figure in figures::stages(&study, group) {
             page.figure(sheet, &figure);
         }

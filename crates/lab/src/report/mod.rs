@@ -1,6 +1,6 @@
 //! Reports of sweeps: from records to plots and tables that say what a variant costs and how far it is from the truth.
 //!
-//! [`html`] makes one page that needs nothing else, [`markdown`] a short page of the book, [`csv`] a table for other programs. All three
+//! [`html`] makes one page that needs nothing else, [`markdown`] a short page of the book, [`csv()`] a table for other programs. All three
 //! say in words what they leave out.
 
 mod book;

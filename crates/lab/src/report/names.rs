@@ -20,6 +20,6 @@ pub(super) fn metric(name: &str) -> Metric<'_> {
     let Some(known) = Known::find(name) else {
         return Metric { title: name, axis: name.to_owned(), doc: None, best: 0.0 };
     };
-    let axis = if known.unit == "1" { known.title.to_owned() } else { format!("{} ({})", known.title, known.unit) };
+    let axis = if known.unit == "1" { known.title.to_owned() } else { format!("{} (unit {})", known.title, known.unit) };
     Metric { title: known.title, axis, doc: Some(known.doc), best: known.best.value() }
 }

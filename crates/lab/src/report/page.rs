@@ -74,7 +74,7 @@ fn sections(study: &Study<'_>, load: Load<'_>) -> Vec<Section> {
     add("papers", "Beside the papers", papers_of(study));
     let metrics = study.metrics();
     let runs = |g| titled(g, Some(tables::runs(study, g, &metrics).html()));
-    add("runs", "All runs", groups().filter_map(runs).chain((!study.records.is_empty()).then(|| explained(&metrics))).collect());
+    add("runs", "All runs", groups().filter_map(runs).chain((!study.records.is_empty()).then(|| explained(study, &metrics))).collect());
     sections
 }
 
@@ -112,10 +112,10 @@ fn titled(group: &Group<'_>, body: Option<Markup>) -> Option<Markup> {
 }
 
 /// What the columns of the tables of runs are.
-fn explained(metrics: &[&str]) -> Markup {
+fn explained(study: &Study<'_>, metrics: &[&str]) -> Markup {
     let metrics: Vec<Metric<'_>> = metrics.iter().map(|name| metric(name)).collect();
     html! {
-        p.note { (tables::FRONT) }
+        p.note { (tables::front_note(study)) }
         dl.note { @for metric in &metrics { @if let Some(doc) = metric.doc { dt { (metric.axis) } dd { (doc) } } } }
     }
 }

@@ -53,7 +53,7 @@ fn caption(study: &Study<'_>, run: usize, pictures: &Markup) -> Markup {
         figure {
             div.pair { (pictures) }
             figcaption {
-                strong { (study.labels[run]) } ": " (study.metric().title) " " (maybe(study.error(run))) ", " (maybe(study.time(run))) " ms"
+                strong { (study.labels[run]) } ": " (study.metric().title) " " (maybe(study.error(run))) ", " (study.time_words()) " " (maybe(study.time(run))) " ms"
             }
         }
     }

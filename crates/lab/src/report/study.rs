@@ -7,7 +7,10 @@ use super::{
     names::{Metric, metric},
     text::count,
 };
-use crate::{record::Record, sheet::Sheet};
+use crate::{
+    record::Record,
+    sheet::{Axis, Sheet},
+};
 
 /// What is said instead of a report without records.
 pub(super) const EMPTY: &str = "There are no records: the sweep has not run, or none of its runs has ended.";
@@ -71,9 +74,25 @@ impl<'a> Study<'a> {
         self.records[run].metrics.get(&self.sheet.metric).copied().filter(|v| v.is_finite())
     }
 
-    /// The time of a run's frame in milliseconds, where it is finite.
+    /// The time of a run that the sheet wants on time axes, in milliseconds, where it is finite.
     pub fn time(&self, run: usize) -> Option<f64> {
-        Some(self.records[run].times.frame()).filter(|v| v.is_finite())
+        self.time_on(self.sheet.axis, run)
+    }
+
+    /// Either time of a run in milliseconds, where it is finite.
+    pub fn time_on(&self, axis: Axis, run: usize) -> Option<f64> {
+        Some(self.records[run].times.on(axis)).filter(|v| v.is_finite())
+    }
+
+    /// What [`Study::time`] is, in words.
+    pub fn time_words(&self) -> &'static str {
+        time_words(self.sheet.axis)
+    }
+
+    /// Title of an axis of such times, with the unit and a word on software adapters.
+    pub fn time_title(&self, axis: Axis) -> String {
+        let of_cpu = if self.records.iter().all(|r| r.times.software) { ", on a CPU" } else { "" };
+        format!("{}{of_cpu} (ms)", time_words(axis))
     }
 
     /// Index of a run's variant.
@@ -109,6 +128,13 @@ impl<'a> Study<'a> {
         let names = missing[..missing.len().min(NAMED)].join("; ");
         let more = if missing.len() > NAMED { "; …" } else { "" };
         Some(format!("{} of {} left out, {why}: {names}{more}.", missing.len(), count(all.len(), "run")))
+    }
+}
+
+fn time_words(axis: Axis) -> &'static str {
+    match axis {
+        Axis::Frame => "time of a frame",
+        Axis::Picture => "time until the picture",
     }
 }
 

@@ -4,8 +4,8 @@ use indexmap::IndexMap;
 use serde_json::json;
 
 use crate::{
-    record::{FORMAT, FrameError, NodeTime, Pictures, Record, ReferenceFacts, SceneFacts, Summary, Times},
-    sheet::{Curve, Paper, Sheet},
+    record::{FrameError, NodeTime, Pictures, Record, Times, tests::example},
+    sheet::{Axis, Curve, Paper, Sheet},
 };
 
 /// A run whose error falls with the root of its clusters and whose time grows with them.
@@ -24,52 +24,19 @@ pub fn run(variant: &str, scene: &str, clusters: u32, filter: &str) -> Record {
     ];
     let sum: f64 = nodes.iter().map(|n| n.median).sum();
     let metrics = |error: f64| IndexMap::from([("relative_rmse".to_owned(), error), ("energy_ratio".to_owned(), 1.0 - error / 2.0)]);
-    let name = format!("{variant} clusters={clusters} filter={filter} {scene}");
     let picture = |what: &str| Some(format!("{what}/{variant}-{scene}-{clusters}-{filter}.png"));
-    Record {
-        format: FORMAT,
-        run: name,
-        inputs: format!("{clusters:x}"),
-        sweep: "counts".into(),
-        variant: variant.into(),
-        pipeline: "acrsm".into(),
-        set: IndexMap::from([("clusters".to_owned(), clusters.to_string()), ("filter".to_owned(), filter.to_owned())]),
-        varied: vec!["clusters".into(), "filter".into()],
-        parameters: json!({"clusters": clusters}),
-        scene: SceneFacts { name: scene.into(), hash: "00".into(), triangles: 32 },
-        size: [256, 256],
-        frames: 24,
-        measured: 16,
-        time: 0.0,
-        fps: None,
-        seed: 1,
-        image: "indirect".into(),
-        reference: ReferenceFacts {
-            name: "one_bounce".into(),
-            hash: "01".into(),
-            paths: Some(4096),
-            relative_standard_error: Some(0.0021),
-        },
-        mask: None,
-        adapter: json!({"name": "llvmpipe", "kind": "software"}),
-        manylight: "0.1.0".into(),
-        date: format!("2026-11-23T12:{:02}:00Z", clusters % 60),
-        times: Times {
-            method: "serial".into(),
-            software: true,
-            wall: Summary { median: sum * 1.05, p95: sum * 1.2, samples: 16 },
-            gpu: None,
-            cpu: None,
-            until_picture: sum * 25.0,
-            nodes,
-        },
-        memory: 64 << 20,
-        metrics: metrics(error),
-        sequence: (0..24)
-            .map(|i| FrameError { time: f64::from(i) / 24.0, metrics: metrics(error * (1.2 + (f64::from(i) / 3.0 + c).sin() / 5.0)) })
-            .collect(),
-        pictures: Pictures { image: picture("image"), reference: Some(format!("reference/{scene}.png")), error: picture("error") },
-    }
+    let mut record = example(variant, clusters, sum * 1.05, error);
+    record.run = format!("{variant} clusters={clusters} filter={filter} | {scene} | 256x256 | seed 0");
+    record.set = IndexMap::from([("clusters".to_owned(), clusters.to_string()), ("filter".to_owned(), filter.to_owned())]);
+    record.varied = vec!["clusters".into(), "filter".into()];
+    record.scene.name = scene.into();
+    record.adapter = json!({"name": "llvmpipe", "kind": "software"});
+    record.times = Times { method: "serial".into(), software: true, gpu: None, nodes, ..record.times };
+    record.metrics = metrics(error);
+    let frame = |i: u32| FrameError { time: f64::from(i) / 24.0, metrics: metrics(error * (1.2 + (f64::from(i) / 3.0 + c).sin() / 5.0)) };
+    record.sequence = (0..24).map(frame).collect();
+    record.pictures = Pictures { image: picture("image"), reference: Some(format!("reference/{scene}.png")), error: picture("error") };
+    record
 }
 
 /// Two variants in two scenes over two knobs, a paper's table and another renderer's curve.
@@ -92,6 +59,7 @@ pub fn sweep() -> (Sheet, Vec<Record>) {
     let sheet = Sheet {
         name: "counts".into(),
         doc: "How does the error fall with the number of lights?\n\nAnd what does it cost?".into(),
+        axis: Axis::Frame,
         metric: "relative_rmse".into(),
         metrics: vec!["relative_rmse".into(), "energy_ratio".into()],
         papers: vec![Paper { source: "[VAL] table 1".into(), unit: "ms".into(), values }],

@@ -6,13 +6,16 @@ use super::{
     table::{Column, Table},
     text::{maybe, number},
 };
-use crate::record::FrameError;
+use crate::{record::FrameError, sheet::Axis};
 
 /// Bytes of a MiB.
 const MIB: f64 = 1024.0 * 1024.0;
 
 /// What is said beneath the tables of runs.
-pub(super) const FRONT: &str = "● is on the Pareto front: no other run is at least as fast and as accurate, and better in one of both.";
+pub(super) fn front_note(study: &Study<'_>) -> String {
+    let (error, time) = (study.metric().title, study.time_words());
+    format!("● is on the Pareto front of {error} and {time}: no other run is at least as good in both and better in one.")
+}
 
 /// Errors and costs of the runs of a group; the Pareto front of time and error is marked.
 pub(super) fn runs(study: &Study<'_>, group: &Group<'_>, metrics: &[&str]) -> Table {
@@ -41,7 +44,7 @@ pub(super) fn stages(study: &Study<'_>, group: &Group<'_>) -> Table {
         let mut row = vec![study.labels[run].clone()];
         row.extend(study.stages.iter().map(|stage| maybe(time_of(stage, &times))));
         row.push(number(times.iter().map(|t| t.1).sum()));
-        row.push(maybe(study.time(run)));
+        row.push(maybe(study.time_on(Axis::Frame, run)));
         row
     };
     Table { columns, rows: group.runs.iter().map(row).collect() }

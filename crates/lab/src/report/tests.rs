@@ -7,7 +7,7 @@ use super::{
     study::{Study, all_stages},
     synthetic::{run, sweep},
 };
-use crate::sheet::Sheet;
+use crate::sheet::{Axis, Sheet};
 
 const PNG: &[u8] = b"\x89PNG made up";
 
@@ -165,6 +165,16 @@ fn ratios_of_a_paper_stand_beside_ours() {
     let cells: Vec<&str> = line.split('|').map(str::trim).collect();
     // Printed, ours, runs, then the ratios of both to the first row and to the first column.
     assert_eq!((cells[3], cells[5], cells[6], cells[8]), ("52.0", "10", "2.00", "1.73"));
+}
+
+#[test]
+fn the_sheet_chooses_the_time() {
+    let (mut sheet, records) = sweep();
+    sheet.axis = Axis::Picture;
+    let page = page(&sheet, &records);
+    assert!(page.contains("cornell, 256×256: RMSE / mean against time until the picture"));
+    assert!(page.contains("RMSE / mean 0.291, time until the picture 207 ms"));
+    assert!(page.contains("time of a frame, on a CPU (ms)"), "stages are those of a frame");
 }
 
 #[test]

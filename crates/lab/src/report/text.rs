@@ -23,25 +23,26 @@ pub(super) fn maybe(value: Option<f64>) -> String {
     value.map_or_else(|| "–".into(), number)
 }
 
-/// A tick of an axis: as short as it can be.
+/// A tick of an axis: as short as it can be, without the digits that binary fractions add.
 pub(super) fn tick(value: f64) -> String {
-    let magnitude = value.abs();
-    let text = if magnitude != 0.0 && !(1e-3..1e6).contains(&magnitude) {
-        format!("{}e{}", value / 10f64.powf(magnitude.log10().floor()), magnitude.log10().floor())
-    } else {
-        // Twelve digits hide what binary fractions add.
-        let text = format!("{value:.9}");
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    let trimmed = |digits: &str| digits.trim_end_matches('0').trim_end_matches('.').to_owned();
+    let scientific = format!("{value:.6e}");
+    let text = match scientific.split_once('e') {
+        Some((digits, exponent)) if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) => format!("{}e{exponent}", trimmed(digits)),
+        _ => trimmed(&format!("{value:.9}")),
     };
     text.replacen('-', "−", usize::from(value < 0.0))
 }
 
-/// At most `most` characters, the last one `…` where some are left out.
+/// At most `most` characters, `…` for those in the middle that are left out: names of runs begin with the variant and end with settings.
 pub(super) fn shorten(text: &str, most: usize) -> String {
-    if text.chars().count() <= most {
+    let characters: Vec<char> = text.chars().collect();
+    if characters.len() <= most {
         return text.to_owned();
     }
-    text.chars().take(most.saturating_sub(1)).chain(['…']).collect()
+    let kept = most.saturating_sub(1);
+    let (head, tail) = (kept.div_ceil(2), kept / 2);
+    characters[..head].iter().chain(&['…']).chain(&characters[characters.len() - tail..]).collect()
 }
 
 /// `1 run`, `2 runs`.
@@ -76,8 +77,17 @@ mod tests {
     }
 
     #[test]
+    fn long_names_keep_both_ends() {
+        assert_eq!(shorten("variant clusters=16", 9), "vari…s=16");
+        assert_eq!(shorten("naïve", 5), "naïve");
+        assert_eq!(shorten("naïve", 0), "…");
+    }
+
+    #[test]
     fn ticks_are_short() {
-        for (value, text) in [(0.05, "0.05"), (0.1 + 0.2, "0.3"), (100.0, "100"), (2e-5, "2e-5"), (-0.5, "−0.5"), (0.0, "0")] {
+        for (value, text) in
+            [(0.05, "0.05"), (0.1 + 0.2, "0.3"), (100.0, "100"), (3.0 * 1e-5, "3e-5"), (-2e7, "−2e7"), (-0.5, "−0.5"), (0.0, "0")]
+        {
             assert_eq!(tick(value), text);
         }
     }

@@ -2,7 +2,7 @@
 
 use indexmap::{IndexMap, IndexSet};
 
-use super::{Figure, along, number_of, time_title};
+use super::{Figure, along, number_of};
 use crate::report::{
     fit::PowerLaw,
     plot::{Axis, Line, Look, Plot, Point, Series},
@@ -62,9 +62,10 @@ impl<'a> Knob<'a> {
         let error = |run| self.study.error(run);
         let time = |run| self.study.time(run);
         let metric = self.study.metric();
+        let time_title = self.study.time_title(self.study.sheet.axis);
         [
             self.figure(&Quantity { words: metric.title, title: &metric.axis, of: &error, slopes: true }),
-            self.figure(&Quantity { words: "time", title: time_title(self.study), of: &time, slopes: false }),
+            self.figure(&Quantity { words: self.study.time_words(), title: &time_title, of: &time, slopes: false }),
         ]
     }
 

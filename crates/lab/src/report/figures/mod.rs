@@ -41,11 +41,6 @@ impl Figure {
     }
 }
 
-/// Title of an axis of frame times.
-fn time_title(study: &Study<'_>) -> &'static str {
-    if study.records.iter().all(|r| r.times.software) { "time of a frame, on a CPU (ms)" } else { "time of a frame (ms)" }
-}
-
 /// Runs of a variant that a knob joins: indices with their values in rising order, or in that of the sweep where values are no numbers.
 fn along(study: &Study<'_>, knob: &str, mut runs: Vec<usize>) -> Vec<usize> {
     let value = |run: usize| study.records[run].set.get(knob).and_then(|v| number_of(v));

@@ -2,7 +2,7 @@
 
 use indexmap::IndexMap;
 
-use super::{Figure, along, time_title};
+use super::{Figure, along};
 use crate::report::{
     plot::{Axis, Line, Look, Plot, Point, Series},
     study::{Group, Study},
@@ -19,14 +19,14 @@ pub(in crate::report) fn scatter(study: &Study<'_>, group: &Group<'_>) -> Figure
     series.extend(curves(study, group, &mut notes));
     let points = || series.iter().flat_map(|s| &s.points).map(|p| p.at);
     let plot = Plot {
-        title: format!("{}: {title} against time", group.title()),
-        x: Axis::of(time_title(study), points().map(|p| p.0)),
+        title: format!("{}: {title} against {}", group.title(), study.time_words()),
+        x: Axis::of(study.time_title(study.sheet.axis), points().map(|p| p.0)),
         y: Axis::of(study.metric().axis, points().map(|p| p.1)),
         ring: (!shown.is_empty()).then_some("Pareto front"),
         series,
     };
     let drawn = plot.series.iter().any(|s| !s.points.is_empty()).then(|| plot.svg());
-    let caption = format!("{title} against the time of a frame, {}", group.title());
+    let caption = format!("{title} against the {}, {}", study.time_words(), group.title());
     Figure::new("error-time", caption, drawn, notes)
 }
 

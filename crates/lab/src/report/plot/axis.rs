@@ -135,7 +135,7 @@ impl ValueFormatter<f64> for Axis {
     }
 }
 
-/// Multiples of 1, 2 or 5 times a power of ten, seven at most.
+/// Multiples of 1, 2 or 5 times a power of ten, eight at most.
 fn linear_ticks(low: f64, high: f64) -> Vec<(f64, String)> {
     let least = (high - low) / 7.0;
     let power = 10f64.powf(least.log10().floor());

@@ -154,6 +154,8 @@ fn draw_labels<'l>(
             within && taken.iter().all(|t| b.2 <= t.0 || t.2 <= b.0 || b.3 <= t.1 || t.3 <= b.1)
         });
         if let Some(place) = free {
+            // Lines beneath stay faintly in sight.
+            area.draw(&Rectangle::new([(place.0, place.1), (place.2, place.3)], WHITE.mix(0.75).filled()))?;
             write(area, label, (place.0, place.1 + half), (HPos::Left, VPos::Center), false)?;
             taken.push(place);
         }
