@@ -8,5 +8,7 @@ mod moving_light;
 mod path_tracer;
 mod reference;
 mod renders;
+mod samples;
 mod support;
+mod visibility;
 mod walkthrough;
