@@ -6,7 +6,7 @@
 #import common::scene::View
 #import common::view::pixel_direction
 #import common::octahedral::unpack_unit
-#import common::cluster::{Cluster, CLUSTER_ACTIVE}
+#import common::cluster::{Cluster, texel_area}
 #import common::radiometry::PI
 
 @group(0) @binding(0) var<storage, read> clusters_warped: array<Cluster>;
@@ -26,8 +26,6 @@ override snap: bool;
 const LANES: u32 = 128u;
 // Below this length the sum of a cluster's unit normals, over their number, has no direction worth the name.
 const CANCELLED: f32 = 1e-3;
-// A texel seen at a grazing angle stands for an area of solid angle × d² / cosθ: the cosine is kept from zero, which bounds the area at 50 times.
-const MIN_COSINE: f32 = 0.02;
 
 struct Sum {
     position: vec3f, // offsets from the old centre: no cancellation of large coordinates
@@ -69,7 +67,7 @@ fn average(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
         let direction = pixel_direction(scene_light_view, texel, textureDimensions(cluster_map));
         let d = textureLoad(rsm_distance, texel, 0).x;
         sum.position += scene_light_view.origin + direction * d - cluster.position;
-        sum.area += flux.a * d * d / max(-dot(normal, direction), MIN_COSINE);
+        sum.area += texel_area(flux.a, d, -dot(normal, direction));
         sum.normal += normal;
         sum.importance += textureLoad(importance, texel, 0).x;
         sum.flux += flux.rgb;

@@ -11,7 +11,6 @@
 #import common::radiometry::max_component
 
 struct Params {
-    clusters: u32,
     window: u32,
     weight_position: f32,
     weight_normal: f32,
@@ -33,6 +32,7 @@ override mapping_is_exact: bool;
 override normal_distance_is_signed: bool;
 
 const GROUP: u32 = 16u;
+// Room for a bit a cluster.
 const LIST_WORDS: u32 = MAX_CLUSTERS / 32u;
 
 // Bit c: cluster c competes in this group of texels.
@@ -40,9 +40,10 @@ var<workgroup> competitors: array<atomic<u32>, LIST_WORDS>;
 
 @compute @workgroup_size(64)
 fn clear(@builtin(global_invocation_id) id: vec3u) {
-    if id.x < arrayLength(&cluster_bounds) {
+    let counter = arrayLength(&cluster_bounds) - 1u;
+    if id.x <= counter {
         // Rectangles start inside out; the counter at the end starts at zero.
-        let least = id.x < 4u * MAX_CLUSTERS && id.x % 4u < 2u;
+        let least = id.x < counter && id.x % 4u < 2u;
         atomicStore(&cluster_bounds[id.x], select(0u, 0xffffffffu, least));
     }
 }
@@ -59,7 +60,8 @@ fn assign(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group
     }
     workgroupBarrier();
     let first = vec2f(group.xy * GROUP);
-    for (var c = lane; c < params.clusters; c += GROUP * GROUP) {
+    let count = min(arrayLength(&clusters_warped), MAX_CLUSTERS);
+    for (var c = lane; c < count; c += GROUP * GROUP) {
         if clusters_warped[c].state == CLUSTER_ACTIVE {
             // The texel of the group that is nearest to the centre.
             let nearest = clamp(clusters_warped[c].texel, first, first + f32(GROUP));
@@ -86,7 +88,7 @@ fn assign(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group
     let texel = vec2f(id.xy) + 0.5;
     var best = NO_CLUSTER;
     var best_distance = 3.0e38;
-    for (var word = 0u; word < LIST_WORDS; word++) {
+    for (var word = 0u; word < (count + 31u) / 32u; word++) {
         var bits = atomicLoad(&competitors[word]);
         while bits != 0u {
             let c = word * 32u + countTrailingZeros(bits);
@@ -103,7 +105,7 @@ fn assign(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group
     }
     if best == NO_CLUSTER {
         // No window holds it: the nearest of all takes its energy, and it is counted.
-        for (var c = 0u; c < params.clusters; c++) {
+        for (var c = 0u; c < count; c++) {
             if clusters_warped[c].state == CLUSTER_ACTIVE {
                 let d = cluster_distance(metric, clusters_warped[c].position, clusters_warped[c].normal, clusters_warped[c].importance, position, normal, rho);
                 if d < best_distance {
@@ -112,7 +114,7 @@ fn assign(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group
                 }
             }
         }
-        atomicAdd(&cluster_bounds[4u * MAX_CLUSTERS], 1u);
+        atomicAdd(&cluster_bounds[arrayLength(&cluster_bounds) - 1u], 1u);
     }
     textureStore(cluster_map, id.xy, vec4u(best));
     if best != NO_CLUSTER {

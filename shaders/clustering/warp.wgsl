@@ -2,12 +2,12 @@
 // Differs from the paper: a seed that still lands on an unlit texel after warping (possible when fewer levels are used) leaves the cluster idle
 // for this frame instead of giving it attributes of nothing.
 
-#import common::cluster::{Cluster, CLUSTER_IDLE, CLUSTER_ACTIVE, CLUSTER_RESEED, CLUSTER_PLACED, MAX_CLUSTERS}
+#import common::cluster::{Cluster, CLUSTER_IDLE, CLUSTER_ACTIVE, CLUSTER_RESEED, CLUSTER_PLACED}
 #import common::scene::View
 #import common::view::pixel_direction
 #import common::octahedral::unpack_unit
 #import common::radiometry::max_component
-#import common::warp::warp_quad
+#import common::warp::warp_to_texel
 
 struct Params {
     warp_levels: u32,
@@ -22,38 +22,16 @@ struct Params {
 @group(0) @binding(6) var<uniform> params: Params;
 @group(0) @binding(7) var<storage, read_write> clusters_warped: array<Cluster>;
 
-// Position in texels of level 0 for a uniform point in [0, 1)².
-fn warp_to_texel(seed: vec2f) -> vec2f {
-    let levels = textureNumLevels(importance);
-    let stop = levels - 1u - min(params.warp_levels, levels - 1u);
-    var quadrant = vec2u(0u);
-    var p = seed;
-    for (var level = levels - 1u; level > stop; level--) {
-        let finer = level - 1u;
-        let q = 2u * quadrant;
-        let weights = vec4f(
-            textureLoad(importance, q, finer).x,
-            textureLoad(importance, q + vec2u(1u, 0u), finer).x,
-            textureLoad(importance, q + vec2u(0u, 1u), finer).x,
-            textureLoad(importance, q + vec2u(1u, 1u), finer).x,
-        );
-        let warped = warp_quad(p, weights);
-        quadrant = q + warped.quadrant;
-        p = warped.position;
-    }
-    return (vec2f(quadrant) + p) * f32(1u << stop);
-}
-
 @compute @workgroup_size(64)
 fn warp(@builtin(global_invocation_id) id: vec3u) {
     let c = id.x;
-    if c >= MAX_CLUSTERS {
+    if c >= arrayLength(&clusters_warped) {
         return;
     }
     var cluster = clusters_seeded[c];
     if cluster.state == CLUSTER_RESEED || cluster.state == CLUSTER_PLACED {
         if cluster.state == CLUSTER_RESEED {
-            cluster.texel = warp_to_texel(cluster.texel);
+            cluster.texel = warp_to_texel(importance, cluster.texel, params.warp_levels).position;
         }
         let size = textureDimensions(rsm_flux);
         let texel = min(vec2u(cluster.texel), size - 1u);

@@ -1,5 +1,5 @@
 // Rays against the hierarchy that the host builds (crate manylight-scene, module `bvh`; layouts are compared when a shader loads).
-// The buffers belong to a node, so the loop over them does, too: these are its parts.
+// A node whose entry points reach `intersect` has the ports `bvh_nodes` and `bvh_triangles`. Cost: some tens of nodes a ray.
 
 struct BvhNode {
     low: vec3f,
@@ -17,8 +17,14 @@ struct BvhTriangle {
     object: u32,
 }
 
+@group(1) @binding(auto) var<storage, read> bvh_nodes: array<BvhNode>;
+@group(1) @binding(auto) var<storage, read> bvh_triangles: array<BvhTriangle>;
+
 // Depth that a traversal's stack must hold; the host refuses deeper hierarchies.
 const BVH_STACK: u32 = 48u;
+
+// Rays start and end this share of the scene's diagonal away from surfaces: hides detail below that size from shadow rays.
+const RAY_OFFSET: f32 = 2e-5;
 
 struct Ray {
     origin: vec3f,
@@ -52,6 +58,9 @@ struct TriangleHit {
     v: f32,
 }
 
+// Rounding may put a ray beside both triangles of an edge that they share: each is larger by this share of itself, so that no ray slips through.
+const EDGE_SLACK: f32 = 1e-6;
+
 // Möller and Trumbore 1997, both sides.
 fn hit_triangle(ray: Ray, triangle: BvhTriangle, nearest: f32, limit: f32) -> TriangleHit {
     let p = cross(ray.direction, triangle.ac);
@@ -62,6 +71,70 @@ fn hit_triangle(ray: Ray, triangle: BvhTriangle, nearest: f32, limit: f32) -> Tr
     let q = cross(s, triangle.ab);
     let v = dot(ray.direction, q) * inverse;
     let t = dot(triangle.ac, q) * inverse;
-    let hit = determinant != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > nearest && t < limit;
+    let inside = min(min(u, v), 1.0 - u - v) >= -EDGE_SLACK;
+    let hit = determinant != 0.0 && inside && t > nearest && t < limit;
     return TriangleHit(select(MISSED, t, hit), u, v);
+}
+
+struct Hit {
+    t: f32, // MISSED if nothing was hit
+    triangle: u32, // in `bvh_triangles`
+    u: f32,
+    v: f32,
+}
+
+// Nearest hit before `limit`; with `any`, whichever comes first.
+fn intersect(ray: Ray, limit: f32, any_hit: bool) -> Hit {
+    var best = Hit(limit, 0u, 0.0, 0.0);
+    var found = false;
+    var stack: array<u32, BVH_STACK>;
+    var height = 0u;
+    var index = 0u;
+    // A scene without triangles has an empty root, with no children.
+    if bvh_nodes[0].count == 0u && bvh_nodes[0].first == 0u {
+        return Hit(MISSED, 0u, 0.0, 0.0);
+    }
+    loop {
+        let node = bvh_nodes[index];
+        if node.count > 0u {
+            for (var i = node.first; i < node.first + node.count; i++) {
+                let hit = hit_triangle(ray, bvh_triangles[i], 0.0, best.t);
+                if hit.t < MISSED {
+                    best = Hit(hit.t, i, hit.u, hit.v);
+                    found = true;
+                    if any_hit {
+                        return best;
+                    }
+                }
+            }
+        } else {
+            let left = bvh_nodes[node.first];
+            let right = bvh_nodes[node.first + 1u];
+            let l = enter_box(ray, left.low, left.high, best.t);
+            let r = enter_box(ray, right.low, right.high, best.t);
+            if l < MISSED && r < MISSED {
+                // The nearer child first; the other waits.
+                stack[height] = select(node.first, node.first + 1u, l <= r);
+                height += 1u;
+                index = select(node.first + 1u, node.first, l <= r);
+                continue;
+            }
+            if l < MISSED || r < MISSED {
+                index = select(node.first + 1u, node.first, l < MISSED);
+                continue;
+            }
+        }
+        if height == 0u {
+            break;
+        }
+        height -= 1u;
+        index = stack[height];
+    }
+    best.t = select(MISSED, best.t, found);
+    return best;
+}
+
+// Whether nothing lies between two points that are off their surfaces already.
+fn visible(p: vec3f, q: vec3f) -> bool {
+    return intersect(make_ray(p, q - p), 1.0, true).t >= MISSED;
 }

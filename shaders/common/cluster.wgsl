@@ -1,6 +1,6 @@
 // A cluster of RSM texels: a virtual area light. [ACRSM] 5.1.2, table 5.2.
 
-// Not in use: beyond the active number, or parked because nothing is lit.
+// Parked: nothing is lit where it is.
 const CLUSTER_IDLE: u32 = 0u;
 const CLUSTER_ACTIVE: u32 = 1u;
 // Waits for a place from the Halton sequence ...
@@ -10,8 +10,8 @@ const CLUSTER_PLACED: u32 = 3u;
 
 // "No cluster" in a cluster map.
 const NO_CLUSTER: u32 = 0xffffffffu;
-// Room for clusters in every buffer of them; the active number is a parameter.
-const MAX_CLUSTERS: u32 = 512u;
+// Buffers of clusters have as many elements as there are; none has more than this.
+const MAX_CLUSTERS: u32 = 4096u;
 
 struct Cluster {
     position: vec3f, // world space
@@ -26,5 +26,13 @@ struct Cluster {
     delta: f32, // [ACRSM] eq. 4.6
     delta_mean: f32, // of its neighbourhood, eq. 4.7; equal to delta when it has no neighbour
     cancelled: u32, // frames in a row in which the mean of its normals vanished and the old one was kept
-    spare: u32,
+    rank: u32, // while evaluating: 1 + its place among those to be merged or split, the worst first; 0: it fits
+}
+
+// A texel seen at a grazing angle stands for an area of solid angle × d² / cosθ: the cosine is kept from zero, which bounds the area at 50 times.
+const MIN_COSINE: f32 = 0.02;
+
+// Surface that a texel stands for, m²: `cosine` at the surface, towards the light.
+fn texel_area(solid_angle: f32, distance: f32, cosine: f32) -> f32 {
+    return solid_angle * distance * distance / max(cosine, MIN_COSINE);
 }

@@ -1,8 +1,9 @@
-// Importance warping of one point on one level of the pyramid. [ACRSM] 4.5 and alg. 5.3, after [CLARBERG].
+// Importance warping: on one level of the pyramid, and down to a texel. [ACRSM] 4.5 and alg. 5.3, after [CLARBERG].
 
 struct Warped {
     quadrant: vec2u, // 0 or 1 in x and y
     position: vec2f, // in [0, 1)² of that quadrant
+    share: f32, // probability of the quadrant
 }
 
 // Largest float below 1.
@@ -21,7 +22,43 @@ fn warp_quad(p: vec2f, weights: vec4f) -> Warped {
     let share_x = select(0.5, row.x / row_total, row_total > 0.0);
     let left = p.x < share_x;
     out.quadrant.x = select(1u, 0u, left);
+    out.share = select(1.0 - share_0, share_0, lower) * select(1.0 - share_x, share_x, left);
     out.position.x = select((p.x - share_x) / (1.0 - share_x), p.x / share_x, left);
     out.position = clamp(out.position, vec2f(0.0), vec2f(ALMOST_ONE));
     return out;
+}
+
+struct WarpedTexel {
+    position: vec2f, // in texels of level 0
+    texel: vec2u, // that which holds it
+    probability: f32, // that a uniform point comes to this texel
+}
+
+// Moves a uniform point in [0, 1)² down `levels` levels of a pyramid of importance, from the coarsest. Within the cell of the level where that ends
+// points are uniform again.
+fn warp_to_texel(pyramid: texture_2d<f32>, seed: vec2f, levels: u32) -> WarpedTexel {
+    let last = textureNumLevels(pyramid) - 1u;
+    let stop = last - min(levels, last);
+    var quadrant = vec2u(0u);
+    var p = seed;
+    var probability = 1.0;
+    for (var level = last; level > stop; level--) {
+        let finer = level - 1u;
+        let q = 2u * quadrant;
+        let weights = vec4f(
+            textureLoad(pyramid, q, finer).x,
+            textureLoad(pyramid, q + vec2u(1u, 0u), finer).x,
+            textureLoad(pyramid, q + vec2u(0u, 1u), finer).x,
+            textureLoad(pyramid, q + vec2u(1u, 1u), finer).x,
+        );
+        let warped = warp_quad(p, weights);
+        quadrant = q + warped.quadrant;
+        p = warped.position;
+        probability *= warped.share;
+    }
+    let cell = 1u << stop;
+    let side = f32(cell);
+    // The sum may round up to the next texel, the parts cannot.
+    let texel = quadrant * cell + min(vec2u(p * side), vec2u(cell - 1u));
+    return WarpedTexel((vec2f(quadrant) + p) * side, texel, probability / (side * side));
 }

@@ -13,7 +13,6 @@
 #import common::random::{hash3, unit_float}
 
 struct Params {
-    clusters: u32,
     ism_size: u32,
     atlas_width: u32,
     splat_factor: f32,
@@ -133,20 +132,21 @@ fn splat_points(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroup
     normal *= inverseSqrt(max(dot(normal, normal), 1e-37));
 
     // A map gets splat_factor / k of all points: each of them stands for so much more area.
-    let share = min(params.splat_factor / f32(params.clusters), 1.0);
+    let maps = arrayLength(&clusters);
+    let share = min(params.splat_factor / f32(maps), 1.0);
     let radius = params.splat_scale * sqrt(point.area / (share * PI));
-    var first = i % params.clusters;
+    var first = i % maps;
     if scatter_is_hash {
         // [ACRSM] 5.3.2, for generated points: primes mix a point's coordinates.
         let unit = fract(abs(position) / max(scene_info.diagonal, 1e-30) * 97.0);
-        first = (i + u32(unit.x * 7.0 * 64.0) + u32(unit.y * 89.0 * 64.0) + u32(unit.z * 991.0 * 64.0)) % params.clusters;
+        first = (i + u32(unit.x * 7.0 * 64.0) + u32(unit.y * 89.0 * 64.0) + u32(unit.z * 991.0 * 64.0)) % maps;
     }
     var copies = u32(params.splat_factor);
     if unit_float(hash3(i, frame.seed, 77u)) < fract(params.splat_factor) {
         copies += 1u;
     }
-    copies = min(copies, params.clusters);
+    copies = min(copies, maps);
     for (var s = 0u; s < copies; s++) {
-        splat((first + s) % params.clusters, position, normal, radius);
+        splat((first + s) % maps, position, normal, radius);
     }
 }

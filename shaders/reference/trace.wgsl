@@ -5,7 +5,7 @@
 // What bounds it: five rays per path and bounce, each some tens of nodes.
 
 #import common::scene::{Frame, View, SpotLight, SceneInfo, Vertex, Triangle, Object, Material, NO_TEXTURE}
-#import common::bvh::{BvhNode, BvhTriangle, Ray, TriangleHit, BVH_STACK, MISSED, make_ray, enter_box, hit_triangle}
+#import common::bvh::{bvh_triangles, Ray, Hit, MISSED, RAY_OFFSET, make_ray, intersect, visible}
 #import common::view::ray_direction
 #import common::radiometry::{PI, spot_falloff, max_component, lambert_blinn}
 #import common::random::{hash, hash3, unit_float}
@@ -26,78 +26,16 @@ struct Params {
 @group(0) @binding(7) var<storage, read> scene_materials: array<Material>;
 @group(0) @binding(8) var scene_textures: texture_2d_array<f32>;
 @group(0) @binding(9) var linear_repeat_sampler: sampler;
-@group(0) @binding(10) var<storage, read> bvh_nodes: array<BvhNode>;
-@group(0) @binding(11) var<storage, read> bvh_triangles: array<BvhTriangle>;
 @group(0) @binding(12) var<uniform> params: Params;
 @group(0) @binding(13) var traced: texture_storage_2d<rgba32float, write>;
 
 override component_is_direct: bool;
 override component_is_full: bool;
 
-// Rays start and end this share of the scene's diagonal away from surfaces: hides detail below that size from shadow rays.
-const OFFSET: f32 = 2e-5;
 // Bounce from which on paths may end at random.
 const ROULETTE_FROM: u32 = 4u;
 // Survival is never likelier than this, so that a white scene's paths end.
 const MOST_SURVIVAL: f32 = 0.95;
-
-struct Hit {
-    t: f32, // MISSED if nothing was hit
-    triangle: u32, // in `bvh_triangles`
-    u: f32,
-    v: f32,
-}
-
-// Nearest hit before `limit`; with `any`, whichever comes first.
-fn intersect(ray: Ray, limit: f32, any_hit: bool) -> Hit {
-    var best = Hit(limit, 0u, 0.0, 0.0);
-    var found = false;
-    var stack: array<u32, BVH_STACK>;
-    var height = 0u;
-    var index = 0u;
-    // A scene without triangles has an empty root, with no children.
-    if bvh_nodes[0].count == 0u && bvh_nodes[0].first == 0u {
-        return Hit(MISSED, 0u, 0.0, 0.0);
-    }
-    loop {
-        let node = bvh_nodes[index];
-        if node.count > 0u {
-            for (var i = node.first; i < node.first + node.count; i++) {
-                let hit = hit_triangle(ray, bvh_triangles[i], 0.0, best.t);
-                if hit.t < MISSED {
-                    best = Hit(hit.t, i, hit.u, hit.v);
-                    found = true;
-                    if any_hit {
-                        return best;
-                    }
-                }
-            }
-        } else {
-            let left = bvh_nodes[node.first];
-            let right = bvh_nodes[node.first + 1u];
-            let l = enter_box(ray, left.low, left.high, best.t);
-            let r = enter_box(ray, right.low, right.high, best.t);
-            if l < MISSED && r < MISSED {
-                // The nearer child first; the other waits.
-                stack[height] = select(node.first, node.first + 1u, l <= r);
-                height += 1u;
-                index = select(node.first + 1u, node.first, l <= r);
-                continue;
-            }
-            if l < MISSED || r < MISSED {
-                index = select(node.first + 1u, node.first, l < MISSED);
-                continue;
-            }
-        }
-        if height == 0u {
-            break;
-        }
-        height -= 1u;
-        index = stack[height];
-    }
-    best.t = select(MISSED, best.t, found);
-    return best;
-}
 
 // A point of a surface as a ray meets it.
 struct Surface {
@@ -146,12 +84,7 @@ fn brdf(s: Surface, towards: vec3f) -> vec3f {
 }
 
 fn lift(s: Surface) -> vec3f {
-    return s.position + s.geometric * (OFFSET * scene_info.diagonal);
-}
-
-// Whether nothing lies between two points that are off their surfaces already.
-fn visible(p: vec3f, q: vec3f) -> bool {
-    return intersect(make_ray(p, q - p), 1.0, true).t >= MISSED;
+    return s.position + s.geometric * (RAY_OFFSET * scene_info.diagonal);
 }
 
 // Irradiance of a surface by the light itself, W/m².

@@ -3,14 +3,9 @@
 #import common::cluster::{Cluster, CLUSTER_ACTIVE, NO_CLUSTER}
 #import common::random::{hash, unit_float}
 
-struct Params {
-    clusters: u32,
-}
-
 @group(0) @binding(0) var cluster_map: texture_2d<u32>;
 @group(0) @binding(1) var<storage, read> clusters: array<Cluster>;
-@group(0) @binding(2) var<uniform> params: Params;
-@group(0) @binding(3) var view: texture_storage_2d<rgba8unorm, write>;
+@group(0) @binding(2) var view: texture_storage_2d<rgba8unorm, write>;
 
 // Radius of a centre's dot, in texels of the RSM.
 const DOT: f32 = 2.5;
@@ -28,7 +23,7 @@ fn show(@builtin(global_invocation_id) id: vec3u) {
     if c != NO_CLUSTER {
         colour = 0.25 + 0.75 * vec3f(unit_float(hash(3u * c)), unit_float(hash(3u * c + 1u)), unit_float(hash(3u * c + 2u)));
     }
-    for (var i = 0u; i < params.clusters; i++) {
+    for (var i = 0u; i < arrayLength(&clusters); i++) {
         if clusters[i].state == CLUSTER_ACTIVE && clusters[i].count > 0u && distance(clusters[i].texel, at) < DOT {
             colour = vec3f(0.0);
         }

@@ -63,7 +63,7 @@ fn a_wrong_parameter_is_named_with_the_nearest_right_one() {
         manylight(&[&["render", "acrsm", "--scene", "cornell", "--set", value, "--out", "target/never.png"][..], &SMALL[..]].concat())
     };
     set("clusers=64").expect(1).says(&["clusers", "clusters"]);
-    set("clusters=5000").expect(1).says(&["clusters", "16", "512"]);
+    set("clusters=5000").expect(1).says(&["clusters", "16", "4096"]);
     set("clusters=many").expect(1).says(&["clusters"]);
     set("visibility=pcs").expect(1).says(&["pcss"]);
 }

@@ -20,7 +20,7 @@ fn job() -> Job {
     ])
 }
 
-fn texels(flux: &Image) -> impl Iterator<Item = (u32, u32, [f64; 3])> + '_ {
+pub fn texels(flux: &Image) -> impl Iterator<Item = (u32, u32, [f64; 3])> + '_ {
     (0..flux.height).flat_map(move |y| {
         (0..flux.width).map(move |x| {
             let p = flux.pixel(x, y);
@@ -34,7 +34,7 @@ fn add(sum: [f64; 3], more: [f64; 3]) -> [f64; 3] {
 }
 
 /// Flux of the reflective shadow map and of the clusters, W.
-fn sums(renderer: &Renderer) -> ([f64; 3], [f64; 3]) {
+pub fn sums(renderer: &Renderer) -> ([f64; 3], [f64; 3]) {
     let rsm = texels(&read(renderer, "rsm_flux")).fold([0.0; 3], |sum, (_, _, flux)| add(sum, flux));
     let clusters = read_clusters(renderer, "clusters").into_iter().fold([0.0; 3], |sum, cluster| add(sum, cluster.flux));
     (rsm, clusters)
@@ -53,6 +53,37 @@ fn the_flux_of_the_clusters_is_the_flux_of_the_map() {
             }
         }
     }
+}
+
+/// A buffer of clusters has as many elements as there are: a change of their number is another buffer, and what has room in it stays.
+#[test]
+fn clusters_survive_a_change_of_their_number() {
+    let mut renderer = job().set("clusters", 16).set("adaptive", false).keep(&["clusters_evaluated"]).render();
+    for (number, least_active) in [(128, 64), (24, 12)] {
+        let before = read_clusters(&renderer, "clusters");
+        renderer.set_parameter("clusters", &number.to_string()).unwrap_or_else(|e| panic!("{e}"));
+        renderer.render_frame(0.0).unwrap_or_else(|e| panic!("{e}"));
+        let carried = read_clusters(&renderer, "clusters_evaluated");
+        assert_eq!(carried.len(), number);
+        for (c, (old, new)) in before.iter().zip(&carried).enumerate() {
+            assert_eq!((old.texel, old.flux, old.count), (new.texel, new.flux, new.count), "cluster {c} of {number}");
+        }
+        // New ones are seeded at once, as many as a frame may.
+        let active = read_clusters(&renderer, "clusters").iter().filter(|c| c.state == ACTIVE && c.count > 0).count();
+        assert!(active >= least_active, "{active} of {number} are active");
+        let (rsm, sum) = sums(&renderer);
+        assert!((0..3).all(|i| (sum[i] / rsm[i] - 1.0).abs() < 1e-3), "{sum:?} W of {rsm:?} W");
+    }
+}
+
+/// As many as there can be: each step of the clustering reaches all of them.
+#[test]
+fn four_thousand_clusters_hold_every_lit_texel() {
+    let renderer = job().set("clusters", 4096).set("visibility", "none").set("seed.max_reseeds", 4096).frames(3).render();
+    let active = read_clusters(&renderer, "clusters").iter().filter(|c| c.count > 0).count();
+    assert!(active > 1000, "only {active} clusters have texels");
+    let (rsm, sum) = sums(&renderer);
+    assert!((0..3).all(|i| (sum[i] / rsm[i] - 1.0).abs() < 1e-3), "{sum:?} W of {rsm:?} W");
 }
 
 #[test]

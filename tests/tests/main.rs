@@ -9,6 +9,8 @@ mod moving_light;
 mod path_tracer;
 mod reference;
 mod renders;
+mod samples;
 mod support;
 mod sweeps;
+mod visibility;
 mod walkthrough;

@@ -10,14 +10,14 @@ use crate::{
     support::{root, shared},
 };
 
-struct Scene {
-    name: &'static str,
-    file: PathBuf,
-    reference: PathBuf,
+pub struct Scene {
+    pub name: &'static str,
+    pub file: PathBuf,
+    pub reference: PathBuf,
 }
 
 /// The Cornell box is part of the repository; the other scenes run where the folder beside it is there.
-fn scenes() -> Vec<Scene> {
+pub fn scenes() -> Vec<Scene> {
     let mut scenes = vec![Scene {
         name: "cornell_blocks",
         file: root().join("assets/cornell.ron"),
@@ -60,7 +60,7 @@ pub fn reference_rgb(picture: &Picture, x: u32, y: u32) -> [f64; 3] {
 }
 
 /// Mean absolute error over the mean, and the energy ratio.
-fn error(image: &Image, reference: &Picture) -> (f64, f64) {
+pub fn error(image: &Image, reference: &Picture) -> (f64, f64) {
     let pixels = || (0..image.height).flat_map(|y| (0..image.width).map(move |x| (x, y)));
     let values = |f: fn([f64; 3], [f64; 3], usize) -> f64| {
         mean(pixels().flat_map(|(x, y)| {

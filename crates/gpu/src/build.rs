@@ -75,7 +75,8 @@ impl Builder<'_> {
 
 impl Frame {
     /// Binds a plan to the device. What the previous frame has and this one needs as well is taken over: pipelines, memory of
-    /// equal shape, histories of equal name and description, and the state of host nodes. The previous frame is not touched:
+    /// equal shape, histories of equal name and description (of a buffer with another count, what
+    /// has room), and the state of host nodes. The previous frame is not touched:
     /// when the build fails it goes on as before; when it succeeds, drop it.
     pub fn build(
         gpu: &Gpu,

@@ -208,7 +208,7 @@ impl<'a> State<'a> {
     }
 
     fn history(&self, name: &str, desc: &ResourceDesc, shape: Shape, out: &mut Allocated) -> Result<Place, Fault> {
-        let old = self.previous.iter().find(|r| r.name == name && r.desc == *desc);
+        let old = self.previous.iter().find(|r| r.name == name && same_but_for_count(&r.desc, desc));
         let Some(Place::History(copies)) = old.map(|r| &r.place) else {
             out.history_reset.push(name.to_owned());
             let zeroed = || make(self.gpu, name, desc, shape);
@@ -218,7 +218,7 @@ impl<'a> State<'a> {
         if copies[0].shape == shape {
             return Ok(Place::History(copies.clone()));
         }
-        // Same name and description, but a new producer writes it in another way: the contents move to new memory.
+        // A buffer of another length, or a new producer writes it in another way: the contents move to new memory.
         let moved = |from: &Allocation| {
             let to = make(self.gpu, name, desc, shape)?;
             copy(self.gpu, &from.memory, &to.memory)
@@ -280,19 +280,30 @@ fn make(gpu: &Gpu, label: &str, desc: &ResourceDesc, shape: Shape) -> Result<All
     Ok(Allocation { shape, memory })
 }
 
-/// Copies a texture with all levels and layers into another of the same shape.
+/// Whether one description is the other, or that of a longer or shorter buffer of the same elements.
+fn same_but_for_count(a: &ResourceDesc, b: &ResourceDesc) -> bool {
+    match (a, b) {
+        (ResourceDesc::Buffer { element: a, stride: x, .. }, ResourceDesc::Buffer { element: b, stride: y, .. }) => a == b && x == y,
+        _ => a == b,
+    }
+}
+
+/// Copies a texture with all levels and layers into another of the same shape, or of a buffer what has room in another.
 fn copy(gpu: &Gpu, from: &Memory, to: &Memory) -> Result<(), String> {
-    let (Memory::Texture(from), Memory::Texture(to)) = (from, to) else {
-        return Ok(());
-    };
     gpu.scoped(|| {
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
-        for mip_level in 0..from.mip_level_count() {
-            let (width, height) = mip_size(from.width(), from.height(), mip_level);
-            let size = wgpu::Extent3d { width, height, depth_or_array_layers: from.depth_or_array_layers() };
-            let level =
-                |texture| wgpu::TexelCopyTextureInfo { texture, mip_level, origin: wgpu::Origin3d::ZERO, aspect: wgpu::TextureAspect::All };
-            encoder.copy_texture_to_texture(level(from), level(to), size);
+        match (from, to) {
+            (Memory::Texture(from), Memory::Texture(to)) => {
+                for mip_level in 0..from.mip_level_count() {
+                    let (width, height) = mip_size(from.width(), from.height(), mip_level);
+                    let size = wgpu::Extent3d { width, height, depth_or_array_layers: from.depth_or_array_layers() };
+                    let (origin, aspect) = (wgpu::Origin3d::ZERO, wgpu::TextureAspect::All);
+                    let level = |texture| wgpu::TexelCopyTextureInfo { texture, mip_level, origin, aspect };
+                    encoder.copy_texture_to_texture(level(from), level(to), size);
+                }
+            }
+            (Memory::Buffer(from), Memory::Buffer(to)) => encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size().min(to.size())),
+            _ => {}
         }
         gpu.queue().submit([encoder.finish()]);
     })

@@ -1,5 +1,7 @@
 //! Histories: zero at first, the last frame's value afterwards, and kept across builds where name and description are equal.
 
+use manylight_gpu::Frame;
+
 use crate::support::World;
 
 const NODE: &str = r#"Node(doc: "Counts frames.",
@@ -50,12 +52,35 @@ fn a_rebuild_keeps_histories_that_fit_and_resets_the_others() {
     for _ in 0..3 {
         world.run(&mut first);
     }
-    world.write("pipelines/test.ron", &PIPELINE.replace("count: 1", "count: 2"));
+    let wider = "\"map\": Texture(format: R32Uint, size: Fixed(3, 1)";
+    world.write("pipelines/test.ron", &PIPELINE.replace("\"map\": Texture(format: R32Uint, size: Fixed(2, 1)", wider));
     let (mut second, report) = world.try_build(Some(&first)).unwrap();
-    assert_eq!((report.history_kept, report.reset), (vec!["map".to_owned()], vec!["counter".to_owned()]));
+    assert_eq!((report.history_kept, report.reset), (vec!["counter".to_owned()], vec!["map".to_owned()]));
     world.run(&mut second);
-    assert_eq!(world.json(&second, "counter"), serde_json::json!([1, 0]));
-    assert_eq!(world.image(&second, "map").data, [40.0; 2]);
+    assert_eq!(world.json(&second, "counter"), serde_json::json!([4]));
+    assert_eq!(world.image(&second, "map").data, [10.0; 3]);
+}
+
+#[test]
+fn a_buffer_of_another_length_keeps_what_has_room() {
+    let mut world = world();
+    let mut first = world.build();
+    for _ in 0..3 {
+        world.run(&mut first);
+    }
+    let mut build = |count: &str, previous: &Frame| {
+        world.write("pipelines/test.ron", &PIPELINE.replace("count: 1", count));
+        let (mut frame, report) = world.try_build(Some(previous)).unwrap();
+        assert!(report.reset.is_empty(), "{:?}", report.reset);
+        world.run(&mut frame);
+        let counter = world.json(&frame, "counter");
+        (frame, counter)
+    };
+    // The frame in between writes the first element only, so the last one stays zero.
+    let (longer, counter) = build("count: 3", &first);
+    assert_eq!(counter, serde_json::json!([4, 0, 0]));
+    let (_, counter) = build("count: 2", &longer);
+    assert_eq!(counter, serde_json::json!([5, 0]));
 }
 
 #[test]

@@ -18,6 +18,7 @@ pub const SAMPLERS: [&str; 3] = ["linear_sampler", "linear_repeat_sampler", NEAR
 pub const PARAMS: &str = "params";
 
 mod entries;
+mod imported;
 mod params;
 mod ports;
 
@@ -47,10 +48,6 @@ impl<'a> Binder<'a> {
         &self.shader.source
     }
 
-    fn global_span(&self, global: &Global) -> Span {
-        Span::new(self.wgsl(), global.span.clone())
-    }
-
     fn has_step(&self, test: impl Fn(&Repeat) -> bool) -> bool {
         self.decl.steps.iter().any(|s| matches!(s, Step::Compute { repeat: Some(r), .. } if test(r)))
     }
@@ -60,28 +57,29 @@ impl<'a> Binder<'a> {
         for global in &self.shader.globals {
             let name = global.name.as_str();
             if global.group > 3 {
-                let fault = Diagnostic::error(
-                    format!("`{name}` is in group {}, and there are groups 0 to 3", global.group),
-                    self.global_span(global),
-                );
+                let fault =
+                    Diagnostic::error(format!("`{name}` is in group {}, and there are groups 0 to 3", global.group), global.span.clone());
                 self.out.push(fault.help("use a smaller `@group`"));
             }
+            self.imported(global);
             if name == PARAMS {
                 self.params(global);
             } else if SAMPLERS.contains(&name) {
                 if global.kind != GlobalKind::Sampler {
-                    let fault = Diagnostic::error(format!("`{name}` is the name of a sampler"), self.global_span(global));
+                    let fault = Diagnostic::error(format!("`{name}` is the name of a sampler"), global.span.clone());
                     self.out.push(fault.help(format!("write `var {name}: sampler;`, or rename it")));
                 }
             } else if let Some(port) = self.decl.ports.get(name) {
                 self.port(global, port);
             } else if let Some((base, port, finer)) = self.neighbour(name) {
                 self.neighbour_level(global, &base, port, finer);
+            } else if global.module.is_some() && global.kind != GlobalKind::Sampler {
+                self.lacks_imported(global);
             } else {
                 let known = self.decl.ports.keys().map(String::as_str).chain(SAMPLERS).chain([PARAMS]);
                 let help = suggest(name, known);
                 self.out.push(
-                    Diagnostic::error(format!("`{name}` is no port of this node"), self.global_span(global))
+                    Diagnostic::error(format!("`{name}` is no port of this node"), global.span.clone())
                         .and(self.decl.span.clone(), "the node's declaration")
                         .help(and_also(
                             help,
@@ -106,7 +104,7 @@ impl<'a> Binder<'a> {
         if !self.has_step(|r| matches!((r, finer), (Repeat::Down(p), true) | (Repeat::Up(p), false) if p == base)) {
             let fault = Diagnostic::error(
                 format!("`{}` exists only in a step with `repeat: {form}(\"{base}\")`", global.name),
-                self.global_span(global),
+                global.span.clone(),
             );
             self.out.push(fault.and(port.span.clone(), "the port").help("add the repetition to the step, or remove the global"));
             return;
@@ -121,7 +119,7 @@ impl<'a> Binder<'a> {
         let problem = mismatch(global, port, self.drawn(&global.name), &self.decl.requires);
         if let Some(problem) = problem {
             self.out.push(
-                Diagnostic::error(format!("`{}` does not fit its port: {problem}", global.name), self.global_span(global))
+                Diagnostic::error(format!("`{}` does not fit its port: {problem}", global.name), global.span.clone())
                     .and(port.span.clone(), "the port")
                     .help(expected),
             );
@@ -167,7 +165,7 @@ impl<'a> Binder<'a> {
                     access.write |= one.write;
                 }
             }
-            let place = self.global_span(&self.shader.globals[index]);
+            let place = self.shader.globals[index].span.clone();
             if !used {
                 self.out.push(
                     Diagnostic::error(format!("no step uses the port `{name}`"), port.span.clone())

@@ -12,7 +12,9 @@ use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor};
 
 use crate::{
+    bind::PARAMS,
     diagnostics::{Diagnostic, Source, Span},
+    reflect::Places,
     render::{and_also, suggest},
     wgsl::{self, Scan},
 };
@@ -23,6 +25,8 @@ use explain::chain;
 
 /// naga_oil keeps the module number above this bit of a span.
 const SPAN_SHIFT: usize = 21;
+/// The bind group of what imported files declare. Nodes that import such a file leave it to them.
+pub(crate) const IMPORTED_GROUP: u32 = 1;
 
 /// A file of `shaders/common/`.
 #[derive(Debug)]
@@ -270,6 +274,11 @@ impl Composition {
         hasher.finish()
     }
 
+    /// Where the items of a text and of its imports are declared.
+    pub fn places<'a>(&'a self, source: &'a Arc<Source>, scan: &'a Scan) -> impl Places + 'a {
+        PlacesOf { composition: self, source, scan }
+    }
+
     /// Composes a text; its imports must be without faults.
     pub fn compose(
         &mut self,
@@ -314,6 +323,27 @@ impl Composition {
     }
 }
 
+struct PlacesOf<'a> {
+    composition: &'a Composition,
+    source: &'a Arc<Source>,
+    scan: &'a Scan,
+}
+
+impl Places for PlacesOf<'_> {
+    fn module(&self, decorated: &str) -> Option<&str> {
+        let mut names = self.composition.modules.keys();
+        names.find(|name| decorated.ends_with(&Composer::decorated_name(Some(name), ""))).map(String::as_str)
+    }
+
+    fn item(&self, module: Option<&str>, keyword: &str, name: &str) -> Span {
+        let (source, scan) = match module.and_then(|name| self.composition.modules.get(name)) {
+            Some(module) => (&module.source, &module.scan),
+            None => (self.source, self.scan),
+        };
+        Span::new(source, scan.item(keyword, name).map_or(0..0, |item| item.range.clone()))
+    }
+}
+
 fn module_needs(module: &Module) -> BTreeSet<String> {
     module.imports.clone()
 }
@@ -327,8 +357,13 @@ fn check_common(module: &Module, out: &mut Vec<Diagnostic>) {
             "compute" | "vertex" | "fragment" => {
                 out.push(fault(range, "a file of shaders/common has no entry points".into(), "move it to a node's shader"));
             }
-            "group" => {
-                out.push(fault(range, "a file of shaders/common has no bindings".into(), "pass the value to the function as an argument"))
+            // Numbers that the composer gives out cannot collide, whichever files a node imports.
+            "group" | "binding" => {
+                let wanted = if name == "group" { format!("({IMPORTED_GROUP})") } else { "(auto)".to_owned() };
+                if !module.source.text[range.end..].starts_with(&wanted) {
+                    let message = "a file of shaders/common does not number its globals".to_owned();
+                    out.push(fault(range, message, &format!("write `@group({IMPORTED_GROUP}) @binding(auto)`")));
+                }
             }
             _ => {}
         }
@@ -337,6 +372,10 @@ fn check_common(module: &Module, out: &mut Vec<Diagnostic>) {
         if name == "define_import_path" {
             out.push(fault(range, "`#define_import_path` is not used here".into(), "remove it: the file's path is its import path"));
         }
+    }
+    if let Some(item) = module.scan.item("var", PARAMS) {
+        let message = format!("`{PARAMS}` are a node's own, and a file of shaders/common has none");
+        out.push(fault(&item.range, message, "pass the value to the function as an argument"));
     }
     for item in module.scan.items.iter().filter(|i| i.keyword == "override") {
         out.push(fault(

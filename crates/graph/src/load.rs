@@ -190,15 +190,12 @@ impl Loader<'_> {
                         return None;
                     }
                 };
-                let found = reflect::reflect(&module, &info, &resolved.scan);
-                for (global, reason) in &found.faults {
-                    let item = resolved.scan.item("var", global).or_else(|| resolved.scan.item("fn", global));
-                    let range = item.map_or(0..0, |i| i.range.clone());
-                    self.out.push(
-                        Diagnostic::error(format!("`{global}` cannot be used in a node"), Span::new(source, range)).help(reason.clone()),
-                    );
-                }
+                let found = reflect::reflect(&module, &info, &self.composition.places(source, &resolved.scan));
                 if !found.faults.is_empty() {
+                    let fault = |(name, span, reason): (String, Span, String)| {
+                        Diagnostic::error(format!("`{name}` cannot be used in a node"), span).help(reason)
+                    };
+                    self.out.extend(found.faults.into_iter().map(fault));
                     return None;
                 }
                 Arc::new(Shader {

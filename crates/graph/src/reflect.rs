@@ -9,9 +9,9 @@ use naga::{
 };
 
 use crate::{
+    diagnostics::Span,
     shader::{Access, Entry, Global, GlobalKind, Layout, Member, MemberKind, SampleKind, Scalar, Stage},
     value::Format,
-    wgsl::Scan,
 };
 
 /// The mark that naga_oil puts between a name and its encoded module.
@@ -19,13 +19,13 @@ const DECORATION: &str = "X_naga_oil_mod_X";
 /// A sampler that does not filter.
 pub(crate) const NEAREST_SAMPLER: &str = "nearest_sampler";
 
-/// What was found, and what a node cannot have: name of the global and the reason.
+/// What was found, and what a node cannot have: name of the global or entry point, its place and the reason.
 pub(crate) struct Reflection {
     pub globals: Vec<Global>,
     pub entries: Vec<Entry>,
     pub overrides: Vec<(String, Scalar)>,
     pub layouts: BTreeMap<String, Layout>,
-    pub faults: Vec<(String, String)>,
+    pub faults: Vec<(String, Span, String)>,
 }
 
 /// The name in the source of an item that may come from another file.
@@ -46,26 +46,41 @@ pub(crate) fn canonical_type(name: &str) -> String {
     compact
 }
 
-/// Reads a validated module.
-pub(crate) fn reflect(module: &Module, info: &ModuleInfo, scan: &Scan) -> Reflection {
+/// Where a shader and the modules that it imports declare their items.
+pub(crate) trait Places {
+    /// The module that an item comes from by its name in the composed module; `None`: the shader itself.
+    fn module(&self, decorated: &str) -> Option<&str>;
+    /// The place of a declaration (`var`, `fn`) in a module or in the shader itself.
+    fn item(&self, module: Option<&str>, keyword: &str, name: &str) -> Span;
+}
+
+/// Reads a validated module. Imported globals that no entry point reaches are left out: their module is used for something else.
+pub(crate) fn reflect(module: &Module, info: &ModuleInfo, places: &dyn Places) -> Reflection {
     let mut out =
         Reflection { globals: Vec::new(), entries: Vec::new(), overrides: Vec::new(), layouts: BTreeMap::new(), faults: Vec::new() };
     let mut index_of = BTreeMap::new();
     for (handle, variable) in module.global_variables.iter() {
         let Some(binding) = variable.binding else { continue };
-        let name = demangle(variable.name.as_deref().unwrap_or("")).to_owned();
+        let decorated = variable.name.as_deref().unwrap_or("");
+        let name = demangle(decorated).to_owned();
+        let home = places.module(decorated).map(str::to_owned);
+        let reached = (0..module.entry_points.len()).any(|entry| !info.get_entry_point(entry)[handle].is_empty());
+        if home.is_some() && !reached {
+            continue;
+        }
+        let span = places.item(home.as_deref(), "var", &name);
         match global_kind(module, variable.space, variable.ty) {
             Ok(kind) => {
                 add_layouts(module, variable.ty, &mut out.layouts);
-                let span = scan.item("var", &name).map_or(0..0, |item| item.range.clone());
                 index_of.insert(handle.index(), out.globals.len());
-                out.globals.push(Global { name, group: binding.group, binding: binding.binding, kind, span });
+                out.globals.push(Global { name, group: binding.group, binding: binding.binding, kind, module: home, span });
             }
-            Err(reason) => out.faults.push((name, reason)),
+            Err(reason) => out.faults.push((name, span, reason)),
         }
     }
     for (index, entry) in module.entry_points.iter().enumerate() {
         let uses_info = info.get_entry_point(index);
+        let mut fault = |reason: &str| out.faults.push((entry.name.clone(), places.item(None, "fn", &entry.name), reason.to_owned()));
         let mut uses = Vec::new();
         for (handle, _) in module.global_variables.iter() {
             let used = uses_info[handle];
@@ -87,19 +102,16 @@ pub(crate) fn reflect(module: &Module, info: &ModuleInfo, scan: &Scan) -> Reflec
             ShaderStage::Fragment => Stage::Fragment,
             ShaderStage::Compute => Stage::Compute,
             _ => {
-                out.faults.push((entry.name.clone(), "only compute, vertex and fragment entry points can be steps".into()));
+                fault("only compute, vertex and fragment entry points can be steps");
                 continue;
             }
         };
         if stage == Stage::Vertex && has_attributes(module, entry) {
-            out.faults.push((
-                entry.name.clone(),
-                "there are no vertex attributes: read vertices from a buffer by `@builtin(vertex_index)`".into(),
-            ));
+            fault("there are no vertex attributes: read vertices from a buffer by `@builtin(vertex_index)`");
         }
         let workgroup_size = if stage == Stage::Compute { entry.workgroup_size } else { [1; 3] };
         if entry.workgroup_size_overrides.is_some_and(|o| o.iter().any(Option::is_some)) {
-            out.faults.push((entry.name.clone(), "the workgroup size is an override; write numbers or a `const`".into()));
+            fault("the workgroup size is an override; write numbers or a `const`");
         }
         let color_targets = if stage == Stage::Fragment { targets(module, entry).len() as u32 } else { 0 };
         out.entries.push(Entry { name: entry.name.clone(), stage, workgroup_size, uses, color_targets });

@@ -73,8 +73,10 @@ pub struct Global {
     pub binding: u32,
     /// Its type.
     pub kind: GlobalKind,
-    /// Where it is declared (byte range in [`Shader::source`]).
-    pub span: std::ops::Range<usize>,
+    /// The module of `shaders/common/` that declares it (`common::rays`); `None`: the shader itself.
+    pub module: Option<String>,
+    /// Where it is declared.
+    pub span: crate::diagnostics::Span,
 }
 
 /// Pipeline stage of an entry point.

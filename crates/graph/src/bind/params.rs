@@ -16,14 +16,14 @@ impl Binder<'_> {
     /// The uniform `params`: each member is a parameter.
     pub(super) fn params(&mut self, global: &Global) {
         let GlobalKind::Uniform { element, .. } = &global.kind else {
-            let fault = Diagnostic::error("`params` is the uniform of the node's parameters", self.global_span(global));
+            let fault = Diagnostic::error("`params` is the uniform of the node's parameters", global.span.clone());
             self.out.push(fault.help("write `var<uniform> params: Params;`, or rename it"));
             return;
         };
         let Some(layout) = self.shader.layouts.get(element) else { return };
         for member in &layout.members {
             let range = wgsl::member(&self.wgsl().text, element, &member.name);
-            let place = range.map_or_else(|| self.global_span(global), |r| Span::new(self.wgsl(), r));
+            let place = range.map_or_else(|| global.span.clone(), |r| Span::new(self.wgsl(), r));
             let Some(param) = self.decl.params.get(&member.name) else {
                 let help = suggest(&member.name, self.decl.params.keys().map(String::as_str));
                 self.out.push(

@@ -296,9 +296,115 @@ fn faults_of_imported_files_point_there_and_are_told_once() {
     one(COMMON, "struct Cell", "struc Cell", &["found \"struc\"", "cell.wgsl:1:1"]);
     one(COMMON, "fn area", "fnn area", &["found \"fnn\"", "cell.wgsl:6:1"]);
     one(COMMON, "fn area", "@compute fn area", &["shaders/common has no entry points", "cell.wgsl:6:1"]);
-    one(COMMON, "fn area", "@group(0) fn area", &["shaders/common has no bindings", "cell.wgsl:6:1"]);
+    let numbered = "@group(1) @binding(3) var<storage, read> cells: array<Cell>;\nfn area";
+    one(COMMON, "fn area", numbered, &["does not number its globals", "cell.wgsl:6:11", "write `@group(1) @binding(auto)`"]);
+    let own = "@group(1) @binding(auto) var<uniform> params: Cell;\nfn area";
+    one(COMMON, "fn area", own, &["`params` are a node's own", "cell.wgsl:6:39"]);
     one(COMMON, "fn area", "override k: u32;\nfn area", &["no overrides, and `k` is one", "cell.wgsl:6:10"]);
     one(COMMON, "fn area", "#define_import_path x\nfn area", &["`#define_import_path` is not used here", "cell.wgsl:6:1"]);
+}
+
+/// A file of shaders/common with a global that one of its functions reads.
+fn with_imported_global() -> Files {
+    let files = add(
+        files(),
+        "shaders/common/light.wgsl",
+        "@group(1) @binding(auto) var<storage, read> lights: array<vec4f>;\nfn first() -> f32 {\n    return lights[0].x;\n}\nfn two() -> f32 {\n    return 2.0;\n}\n",
+    );
+    let files = edit(
+        files,
+        WGSL,
+        "#import common::cell::{Cell, area}\n",
+        "#import common::cell::{Cell, area}\n#import common::light::{first, two}\n",
+    );
+    let files = edit(files, WGSL, "params.strength * view.far", "first() * params.strength * view.far");
+    edit(files, RON, VIEW, &format!("{VIEW}, \"lights\": Buffer(of: \"vec4f\", doc: \"x\")"))
+}
+
+#[test]
+fn imported_globals_are_ports_by_their_plain_names() {
+    let files = with_imported_global();
+    let (registry, faults) = registry(&files, &[]);
+    assert!(faults.is_empty(), "{faults}");
+    let shader = registry.nodes["draw/paint"].shader.as_ref().expect("a shader");
+    let light = shader.globals.iter().find(|g| g.name == "lights").expect("the imported global");
+    assert_eq!((light.group, light.module.as_deref()), (1, Some("common::light")));
+    assert_eq!((light.span.source.name.as_str(), light.span.text()), ("shaders/common/light.wgsl", "lights"));
+    // The first step clears cells and reads no light.
+    let entry = |name: &str| shader.entries.iter().find(|e| e.name == name).expect("an entry point");
+    let uses = |name: &str| entry(name).uses.iter().any(|(global, _)| shader.globals[*global].name == "lights");
+    assert_eq!((uses("clear"), uses("paint")), (false, true));
+    // Who reaches nothing that reads it needs no port.
+    let files = edit(files, WGSL, "first() *", "two() *");
+    let files = edit(files, RON, ", \"lights\": Buffer(of: \"vec4f\", doc: \"x\")", "");
+    assert_faults(&registry_faults(&files), 0, &[]);
+}
+
+#[test]
+fn globals_of_two_imported_files_have_different_numbers() {
+    let files = add(
+        with_imported_global(),
+        "shaders/common/mass.wgsl",
+        "@group(1) @binding(auto) var<uniform> mass: vec4f;\nfn weight() -> f32 {\n    return mass.x;\n}\n",
+    );
+    let files = edit(files, WGSL, "#import common::light", "#import common::mass::weight\n#import common::light");
+    let files = edit(files, WGSL, "first() *", "weight() * first() *");
+    let files = edit(files, RON, VIEW, &format!("{VIEW}, \"mass\": Uniform(of: \"vec4f\", doc: \"x\")"));
+    let (registry, faults) = registry(&files, &[]);
+    assert!(faults.is_empty(), "{faults}");
+    let shader = registry.nodes["draw/paint"].shader.as_ref().expect("a shader");
+    let mut numbers: Vec<_> = shader.globals.iter().map(|g| (g.group, g.binding)).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    assert_eq!(numbers.len(), shader.globals.len());
+}
+
+#[test]
+fn faults_of_imported_globals_show_the_node_and_the_file() {
+    let files = with_imported_global();
+    let rendered = registry_faults(&edit(files.clone(), RON, ", \"lights\": Buffer(of: \"vec4f\", doc: \"x\")", ""));
+    assert_faults(
+        &rendered,
+        1,
+        &[
+            "`lights`, which `common::light` reads, is no port of this node",
+            "paint.ron:1:1",
+            "paint.wgsl:2:25",
+            "imported here",
+            "shaders/common/light.wgsl:1:45",
+            "declared here",
+        ],
+    );
+    assert_faults(&rendered, 1, &["Add `\"lights\": Buffer(of: \"vec4f\", doc: \"…\")` to the node's inputs"]);
+    let misspelt = edit(files.clone(), RON, "\"lights\": Buffer", "\"light\": Buffer");
+    assert_faults(&registry_faults(&misspelt), 1, &["`lights`, which `common::light` reads", "did you mean `light`?"]);
+    let other = edit(files.clone(), RON, "Buffer(of: \"vec4f\"", "Buffer(of: \"vec3f\"");
+    assert_faults(&registry_faults(&other), 1, &["the port is of `vec3f`, the shader of `vec4f`", "light.wgsl:1:45", "paint.ron:4:"]);
+    let written = edit(files.clone(), "shaders/common/light.wgsl", "<storage, read>", "<storage, read_write>");
+    let written = edit(written, RON, ", \"lights\": Buffer(of: \"vec4f\", doc: \"x\")", "");
+    let written = edit(written, RON, "outputs: {", "outputs: { \"lights\": Buffer(of: \"vec4f\", doc: \"x\"),");
+    let written = edit(written, "shaders/common/light.wgsl", "return lights[0].x", "lights[0].x = 1.0; return lights[0].x");
+    assert_faults(&registry_faults(&written), 1, &["`lights` is written in a file of shaders/common", "light.wgsl:1:"]);
+    let twice = "@group(0) @binding(9) var<storage, read> lights: array<vec4f>;\n@group(0) @binding(3)";
+    let twice = edit(files.clone(), WGSL, "@group(0) @binding(3)", twice);
+    let twice = edit(twice, WGSL, "first() *", "lights[0].y * first() *");
+    assert_faults(
+        &registry_faults(&twice),
+        1,
+        &["`lights` is declared twice", "paint.wgsl:18:", "light.wgsl:1:45", "`common::light::lights`"],
+    );
+    let sampler = "@group(1) @binding(auto) var odd: sampler;\n@group(1) @binding(auto) var map: texture_2d<f32>;\nfn two() -> f32 {";
+    let sampler = edit(files.clone(), "shaders/common/light.wgsl", "fn two() -> f32 {", sampler);
+    let sampler = edit(sampler, "shaders/common/light.wgsl", "return 2.0;", "return textureSampleLevel(map, odd, vec2f(0.5), 0.0).x;");
+    let sampler = edit(sampler, WGSL, "first() *", "two() * first() *");
+    let sampler = edit(sampler, RON, VIEW, &format!("{VIEW}, \"map\": Texture(doc: \"x\")"));
+    assert_faults(&registry_faults(&sampler), 1, &["`odd` is no port of this node", "light.wgsl:5:30", "linear_sampler"]);
+    let group = edit(files, WGSL, "@group(0) @binding(3)", "@group(1) @binding(3)");
+    assert_faults(
+        &registry_faults(&group),
+        1,
+        &["group 1 belongs to what imported files declare", "paint.wgsl:18:48", "use another `@group`"],
+    );
 }
 
 #[test]

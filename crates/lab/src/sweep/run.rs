@@ -179,7 +179,7 @@ impl Bench<'_> {
             let frame = sweep.frames_of(run.variant) + index;
             renderer.render_frame(self.time(frame))?;
             let image = self.image(run, renderer)?;
-            if index % sequence.every == 0 {
+            if index.is_multiple_of(sequence.every) {
                 let reference = self.reference(run, frame, progress)?;
                 let metrics = compare(&image, &reference, self.mask(renderer)?.as_ref())?.named();
                 all.push(FrameError { time: self.time(frame), metrics });
