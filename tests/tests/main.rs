@@ -4,9 +4,11 @@
 mod cli;
 mod clustering;
 mod determinism;
+mod lights;
 mod moving_light;
 mod path_tracer;
 mod reference;
 mod renders;
 mod support;
+mod twin;
 mod walkthrough;
