@@ -1,6 +1,6 @@
 // Light and its transport between surfaces. Units: W, W/sr, W/m², W/(m² sr), each for linear red, green, blue.
 
-#import common::scene::{SpotLight, FALLOFF_COSINE, FALLOFF_SMOOTH}
+#import common::scene::{Light, FALLOFF_COSINE, FALLOFF_SMOOTH, LIGHT_POINT, LIGHT_DIRECTIONAL}
 
 const PI: f32 = 3.14159265358979;
 
@@ -13,7 +13,7 @@ fn max_component(rgb: vec3f) -> f32 {
 }
 
 // Share of the full intensity that a spot light sends along `direction` (unit, away from the light).
-fn spot_falloff(light: SpotLight, direction: vec3f) -> f32 {
+fn spot_falloff(light: Light, direction: vec3f) -> f32 {
     let cosine = dot(light.direction, direction);
     // atan2 keeps its precision at small angles, where acos of a number near 1 has none.
     let angle = atan2(length(cross(light.direction, direction)), cosine);
@@ -29,6 +29,32 @@ fn spot_falloff(light: SpotLight, direction: vec3f) -> f32 {
         return t * t * (3.0 - 2.0 * t);
     }
     return t;
+}
+
+// The light that arrives at a point if nothing is between.
+struct Arrival {
+    to_light: vec3f, // unit
+    irradiance: vec3f, // of a surface that faces the light, W/m²
+    ray_density: f32, // that a path tracer's rays from this light have across them, 1/m²
+}
+
+// Square of the distance to a light below which its irradiance grows no further, so that it stays finite. No surface is that near.
+const LEAST_DISTANCE2: f32 = 1e-20;
+
+// What arrives at `position` from a light of any kind; methods: radiometry.
+fn light_at(light: Light, position: vec3f) -> Arrival {
+    if light.kind == LIGHT_DIRECTIONAL {
+        return Arrival(-light.direction, light.strength, light.ray_density);
+    }
+    let offset = light.position - position;
+    let to_light = offset * inverseSqrt(max(dot(offset, offset), 1e-30));
+    let spread = 1.0 / max(dot(offset, offset), LEAST_DISTANCE2);
+    var falloff = 1.0;
+    if light.kind != LIGHT_POINT {
+        falloff = spot_falloff(light, -to_light);
+    }
+    // Rays are uniform in a spot light's whole cone; where none go, outside, there is no light that the density could weigh.
+    return Arrival(to_light, light.strength * (falloff * spread), light.ray_density * spread);
 }
 
 // Form factor from a disk of area `area` at distance² `d2` to a surface element, over the element's area: [ACRSM] eq. 5.5, after [WALLACE].

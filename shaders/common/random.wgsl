@@ -39,3 +39,26 @@ fn radical_inverse_3(index: u32) -> f32 {
 fn halton_23(index: u32) -> vec2f {
     return vec2f(radical_inverse_2(index), radical_inverse_3(index));
 }
+
+// Owen's scrambling in a hash: each bit is flipped or not, depending on the bits above it. [BURLEY], after Laine and Karras.
+fn owen_scramble(bits: u32, seed: u32) -> u32 {
+    var x = reverseBits(bits) + seed;
+    x ^= x * 0x6c50b47cu;
+    x ^= x * 0xb82f1e52u;
+    x ^= x * 0xc7afe638u;
+    x ^= x * 0x8d22f6e6u;
+    return reverseBits(x);
+}
+
+// Point `index` (below 256) of the first two dimensions of Sobol's sequence, shuffled and scrambled by a seed: any aligned 2^k of the points lie one in
+// each of 2^k equal boxes, in [0, 1)². Points of different seeds are independent. [BURLEY]
+fn scrambled_sobol(index: u32, seed: u32) -> vec2f {
+    var i = owen_scramble(index, seed) & 255u;
+    let x = reverseBits(i);
+    var y = 0u;
+    for (var column = 0x80000000u; i != 0u; column ^= column >> 1u) {
+        y ^= select(0u, column, (i & 1u) != 0u);
+        i >>= 1u;
+    }
+    return vec2f(unit_float(owen_scramble(x, hash(seed ^ 1u))), unit_float(owen_scramble(y, hash(seed ^ 2u))));
+}

@@ -17,13 +17,21 @@ const FALLOFF_LINEAR: u32 = 0u;
 const FALLOFF_COSINE: u32 = 1u;
 const FALLOFF_SMOOTH: u32 = 2u;
 
-struct SpotLight {
-    position: vec3f,
-    beam_rad: f32, // half-angle of full intensity
-    direction: vec3f,
-    cutoff_rad: f32, // half-angle beyond which it is dark
-    intensity: vec3f, // W/sr
-    falloff: u32,
+const LIGHT_SPOT: u32 = 0u;
+const LIGHT_POINT: u32 = 1u;
+const LIGHT_DIRECTIONAL: u32 = 2u;
+
+struct Light {
+    position: vec3f, // directional: middle of a disk across its rays, before the scene and as wide as all of it
+    kind: u32,
+    direction: vec3f, // unit: axis of a spot light, way of a directional one's rays
+    falloff: u32, // spot
+    strength: vec3f, // intensity along the axis, W/sr; directional: irradiance of a surface that faces it, W/m²
+    beam_rad: f32, // half-angle of full intensity; point: π
+    cutoff_rad: f32, // half-angle beyond which it is dark; point: π
+    radius: f32, // of a directional light's disk
+    share: f32, // of the power of all lights: how probably a path tracer sends a ray from it
+    ray_density: f32, // share over what its rays are spread over: solid angle, sr; directional: area of the disk, m²
 }
 
 // Counters and sizes of the frame.

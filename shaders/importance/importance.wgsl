@@ -2,7 +2,7 @@
 // Differs from the paper: the light's colour and the exponent are divided by their largest values, so that the result stays in [0, 1];
 // the sampled positions also cut off what lies behind the lit surface (it cannot receive its light).
 
-#import common::scene::{SpotLight, View, Frame}
+#import common::scene::{Light, View, Frame}
 #import common::view::pixel_direction
 #import common::octahedral::unpack_unit
 #import common::radiometry::{spot_falloff, max_component}
@@ -15,7 +15,7 @@ struct Params {
     shininess_scale: f32,
 }
 
-@group(0) @binding(0) var<uniform> scene_light: SpotLight;
+@group(0) @binding(0) var<uniform> scene_light: Light;
 @group(0) @binding(1) var<uniform> scene_light_view: View;
 @group(0) @binding(2) var<uniform> scene_camera: View;
 @group(0) @binding(3) var<uniform> frame: Frame;
@@ -75,7 +75,7 @@ fn estimate(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     var importance = 0.0;
     if all(id.xy < rsm_size) && max_component(textureLoad(rsm_flux, id.xy, 0).rgb) > 0.0 {
         let direction = pixel_direction(scene_light_view, id.xy, rsm_size);
-        let light = scene_light.intensity / max(max_component(scene_light.intensity), 1e-30) * saturate(spot_falloff(scene_light, direction));
+        let light = scene_light.strength / max(max_component(scene_light.strength), 1e-30) * saturate(spot_falloff(scene_light, direction));
         let specular = textureLoad(rsm_specular, id.xy, 0);
         let f_d = max_component(textureLoad(rsm_albedo, id.xy, 0).rgb * light); // [ACRSM] eq. 5.1
         let f_s = max_component(specular.rgb * light) * saturate(specular.a / params.shininess_scale); // [ACRSM] eq. 5.2

@@ -1,6 +1,6 @@
 // Direct light. [ACRSM] 5.3.4; BRDF: Lambert + normalised Blinn.
 
-#import common::scene::{View, SpotLight}
+#import common::scene::{View, Light}
 #import common::view::{pixel_direction, view_uv}
 #import common::octahedral::unpack_unit
 #import common::radiometry::{spot_falloff, max_component, lambert_blinn}
@@ -12,7 +12,7 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> scene_camera: View;
-@group(0) @binding(1) var<uniform> scene_light: SpotLight;
+@group(0) @binding(1) var<uniform> scene_light: Light;
 @group(0) @binding(2) var<uniform> scene_light_view: View;
 @group(0) @binding(3) var gbuffer_albedo: texture_2d<f32>;
 @group(0) @binding(4) var gbuffer_specular: texture_2d<f32>;
@@ -66,7 +66,7 @@ fn light(@builtin(global_invocation_id) id: vec3u) {
         let d2 = max(dot(to_light, to_light), 1e-30);
         let l = to_light * inverseSqrt(d2);
         let cosine = dot(normal, l);
-        let intensity = scene_light.intensity * spot_falloff(scene_light, -l);
+        let intensity = scene_light.strength * spot_falloff(scene_light, -l);
         if cosine > 0.0 && max_component(intensity) > 0.0 {
             visible = shadow(position, normal);
             let specular = textureLoad(gbuffer_specular, id.xy, 0);

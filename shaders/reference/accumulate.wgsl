@@ -1,6 +1,6 @@
 // Progressive mean and standard error from independent batches: every frame is one. Welford's update keeps small variances of large means.
 
-#import common::scene::{Frame, View, SpotLight}
+#import common::scene::{Frame, View, SceneInfo, Light}
 #import common::random::hash
 
 struct Params {
@@ -9,17 +9,18 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> scene_camera: View;
-@group(0) @binding(2) var<uniform> scene_light: SpotLight;
-@group(0) @binding(3) var<uniform> params: Params;
-@group(0) @binding(4) var traced: texture_2d<f32>;
-@group(0) @binding(5) var sum_previous: texture_2d<f32>;
-@group(0) @binding(6) var squares_previous: texture_2d<f32>;
-@group(0) @binding(7) var<storage, read> key_previous: array<u32>;
-@group(0) @binding(8) var sum: texture_storage_2d<rgba32float, write>;
-@group(0) @binding(9) var squares: texture_storage_2d<rgba32float, write>;
-@group(0) @binding(10) var<storage, read_write> key: array<u32>;
-@group(0) @binding(11) var composed: texture_storage_2d<rgba32float, write>;
-@group(0) @binding(12) var standard_error: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(2) var<uniform> scene_info: SceneInfo;
+@group(0) @binding(3) var<storage, read> scene_lights: array<Light>;
+@group(0) @binding(4) var<uniform> params: Params;
+@group(0) @binding(5) var traced: texture_2d<f32>;
+@group(0) @binding(6) var sum_previous: texture_2d<f32>;
+@group(0) @binding(7) var squares_previous: texture_2d<f32>;
+@group(0) @binding(8) var<storage, read> key_previous: array<u32>;
+@group(0) @binding(9) var sum: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(10) var squares: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(11) var<storage, read_write> key: array<u32>;
+@group(0) @binding(12) var composed: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(13) var standard_error: texture_storage_2d<rgba32float, write>;
 
 fn mix(seed: u32, v: vec4f) -> u32 {
     let b = bitcast<vec4u>(v);
@@ -28,14 +29,24 @@ fn mix(seed: u32, v: vec4f) -> u32 {
 
 // What a mean must not be taken over.
 fn current_key() -> u32 {
-    var h = hash(params.component ^ scene_light.falloff ^ bitcast<u32>(frame.time));
+    var h = hash(params.component ^ hash(scene_info.light_count ^ bitcast<u32>(frame.time)));
     for (var i = 0u; i < 4u; i++) {
         h = mix(h, scene_camera.clip_from_world[i]);
     }
-    h = mix(h, vec4f(scene_camera.origin, scene_light.beam_rad));
-    h = mix(h, vec4f(scene_light.position, scene_light.cutoff_rad));
-    h = mix(h, vec4f(scene_light.direction, 0.0));
-    return mix(h, vec4f(scene_light.intensity, 0.0));
+    h = mix(h, vec4f(scene_camera.origin, 0.0));
+    for (var i = 0u; i < scene_info.light_count; i++) {
+        let light = scene_lights[i];
+        h = hash(h ^ light.kind ^ (light.falloff << 8u));
+        h = mix(h, vec4f(light.position, light.beam_rad));
+        h = mix(h, vec4f(light.direction, light.cutoff_rad));
+        h = mix(h, vec4f(light.strength, 0.0));
+    }
+    return h;
+}
+
+@compute @workgroup_size(1)
+fn remember() {
+    key[0] = current_key();
 }
 
 @compute @workgroup_size(8, 8)
@@ -46,7 +57,7 @@ fn accumulate(@builtin(global_invocation_id) id: vec3u) {
     let value = textureLoad(traced, id.xy, 0).rgb;
     var total = vec4f(value, 1.0);
     var spread = vec3f(0.0);
-    if frame.index > 0u && key_previous[0] == current_key() {
+    if frame.index > 0u && key_previous[0] == key[0] {
         let before = textureLoad(sum_previous, id.xy, 0);
         total = before + vec4f(value, 1.0);
         let old_mean = before.rgb / before.a;
@@ -58,9 +69,4 @@ fn accumulate(@builtin(global_invocation_id) id: vec3u) {
     let n = total.a;
     let error = select(vec3f(0.0), sqrt(max(spread, vec3f(0.0)) / (n * max(n - 1.0, 1.0))), n > 1.0);
     textureStore(standard_error, id.xy, vec4f(error, n));
-}
-
-@compute @workgroup_size(1)
-fn remember() {
-    key[0] = current_key();
 }

@@ -1,14 +1,15 @@
 // Path tracer: the truth that the other pipelines are compared with.
-// At each vertex of a camera path the light that comes in one bounce is estimated in two ways: by a point that a ray in the light's cone
-// hits (good where the cone is small), and by the path's next vertex, a cosine-distributed direction (good where surfaces are near each other).
-// The balance heuristic (Veach 1997) joins them. Russian roulette from the fourth bounce on. Surfaces: Lambert and normalised Blinn, two-sided.
-// What bounds it: five rays per path and bounce, each some tens of nodes.
+// At each vertex of a camera path the light that comes in one bounce is estimated in two ways: by a point that a ray from a light hits (good
+// where its cone is small), the light chosen in proportion to its power, and by the path's next vertex, a cosine-distributed direction (good
+// where surfaces are near each other). The balance heuristic (Veach 1997) joins them, light by light. Russian roulette from the fourth bounce
+// on. The paths of a frame are spread evenly over pixel, light and directions; frames are independent. Surfaces: Lambert and normalised Blinn, two-sided.
+// What bounds it: three rays per path and bounce and one for each light, each some tens of nodes.
 
-#import common::scene::{Frame, View, SpotLight, SceneInfo, Vertex, Triangle, Object, Material, NO_TEXTURE}
+#import common::scene::{Frame, View, Light, SceneInfo, Vertex, Triangle, Object, Material, NO_TEXTURE, LIGHT_DIRECTIONAL}
 #import common::bvh::{bvh_triangles, Ray, Hit, MISSED, RAY_OFFSET, make_ray, intersect, visible}
 #import common::view::ray_direction
-#import common::radiometry::{PI, spot_falloff, max_component, lambert_blinn}
-#import common::random::{hash, hash3, unit_float}
+#import common::radiometry::{PI, Arrival, light_at, max_component, lambert_blinn}
+#import common::random::{hash, hash3, unit_float, scrambled_sobol}
 #import common::paraboloid::basis
 
 struct Params {
@@ -18,7 +19,7 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> scene_camera: View;
-@group(0) @binding(2) var<uniform> scene_light: SpotLight;
+@group(0) @binding(2) var<storage, read> scene_lights: array<Light>;
 @group(0) @binding(3) var<uniform> scene_info: SceneInfo;
 @group(0) @binding(4) var<storage, read> scene_vertices: array<Vertex>;
 @group(0) @binding(5) var<storage, read> scene_triangles: array<Triangle>;
@@ -87,26 +88,41 @@ fn lift(s: Surface) -> vec3f {
     return s.position + s.geometric * (RAY_OFFSET * scene_info.diagonal);
 }
 
-// Irradiance of a surface by the light itself, W/m².
-fn light_irradiance(s: Surface) -> vec3f {
-    let to_light = scene_light.position - s.position;
-    let d2 = dot(to_light, to_light);
-    let l = to_light * inverseSqrt(max(d2, 1e-30));
-    let cosine = dot(s.normal, l);
-    let falloff = spot_falloff(scene_light, -l);
-    if cosine <= 0.0 || dot(s.geometric, l) <= 0.0 || falloff <= 0.0 || !visible(lift(s), scene_light.position) {
-        return vec3f(0.0);
-    }
-    return scene_light.intensity * (falloff * cosine / max(d2, 1e-30));
+// Whether nothing lies between a surface and a point that is off its own surface already.
+fn sees(s: Surface, point: vec3f) -> bool {
+    return visible(lift(s), point);
 }
 
-// Radiance that a surface sends to its viewer of the light itself.
-fn direct(s: Surface) -> vec3f {
-    let e = light_irradiance(s);
-    if max_component(e) <= 0.0 {
+// Whether nothing lies between a surface and a light.
+fn sees_light(s: Surface, light: Light) -> bool {
+    if light.kind == LIGHT_DIRECTIONAL {
+        return intersect(make_ray(lift(s), -light.direction), MISSED, true).t >= MISSED;
+    }
+    return sees(s, light.position);
+}
+
+// Radiance that a surface sends to its viewer of what arrives from a light, W/(m² sr).
+fn reflected(s: Surface, arrival: Arrival) -> vec3f {
+    return arrival.irradiance * max(dot(s.normal, arrival.to_light), 0.0) * brdf(s, arrival.to_light);
+}
+
+// The same with shadows: black if the light is behind the surface or something lies between.
+fn direct_of(s: Surface, light: Light, arrival: Arrival) -> vec3f {
+    let radiance = reflected(s, arrival);
+    if max_component(radiance) <= 0.0 || dot(s.geometric, arrival.to_light) <= 0.0 || !sees_light(s, light) {
         return vec3f(0.0);
     }
-    return e * brdf(s, normalize(scene_light.position - s.position));
+    return radiance;
+}
+
+// Radiance that a surface sends to its viewer of the lights themselves. All of them have a shadow ray: one that is chosen by its power
+// would be noise where a weak light is near, and the cost is small against that of the rest for the few lights that scenes have.
+fn direct(s: Surface) -> vec3f {
+    var radiance = vec3f(0.0);
+    for (var i = 0u; i < scene_info.light_count; i++) {
+        radiance += direct_of(s, scene_lights[i], light_at(scene_lights[i], s.position));
+    }
+    return radiance;
 }
 
 var<private> random_state: u32;
@@ -116,77 +132,127 @@ fn random() -> f32 {
     return unit_float(random_state);
 }
 
-fn cone_solid_angle() -> f32 {
-    let s = sin(0.5 * scene_light.cutoff_rad);
-    return 4.0 * PI * s * s;
+// What the paths of a frame spread evenly over each pixel: a place in the pixel, the ray from the light and the next direction of the first vertex.
+// Later decisions are independent.
+const IN_PIXEL: u32 = 0x1000u;
+const FROM_LIGHT: u32 = 0x2000u;
+const NEXT: u32 = 0x3000u;
+
+var<private> pixel_seed: u32;
+var<private> path_index: u32;
+
+fn random_pair(purpose: u32, bounce: u32) -> vec2f {
+    if bounce > 0u {
+        return vec2f(random(), random());
+    }
+    return scrambled_sobol(path_index, hash(pixel_seed ^ purpose));
 }
 
-// Density per area at `y`, at distance² `d2` and with cosine `cos_y` towards the light, of points that rays in the cone hit.
-fn pdf_cone(cos_y: f32, d2: f32) -> f32 {
-    return cos_y / (cone_solid_angle() * max(d2, 1e-30));
+// Density per area at `y` of points that rays from a light hit. Here and below, densities have the cosines of the triangle itself: a
+// smooth normal changes what a surface reflects, not how large it is.
+fn pdf_light(y: Surface, arrival: Arrival) -> f32 {
+    return arrival.ray_density * max(dot(y.geometric, arrival.to_light), 0.0);
 }
 
-// Density per area of points that cosine-distributed directions from `x` hit.
-fn pdf_cosine(cos_x: f32, cos_y: f32, d2: f32) -> f32 {
-    return cos_x / PI * cos_y / max(d2, 1e-30);
+// Unit vector from one point to another; zero where they are the same.
+fn towards(origin: vec3f, point: vec3f) -> vec3f {
+    let offset = point - origin;
+    return offset * inverseSqrt(max(dot(offset, offset), 1e-30));
 }
 
-fn uniform_in_cone() -> vec3f {
-    let s = sin(0.5 * scene_light.cutoff_rad);
-    let one_minus_cos = random() * 2.0 * s * s;
-    let angle = 2.0 * PI * random();
+// Cosines at both ends over distance²: the projected solid angle that the surface at `y` has from `x`, over its area. 1/m²
+fn coupling(x: Surface, y: Surface) -> f32 {
+    let to_x = x.position - y.position;
+    let direction = towards(y.position, x.position);
+    return max(-dot(x.normal, direction), 0.0) * max(dot(y.geometric, direction), 0.0) / max(dot(to_x, to_x), 1e-30);
+}
+
+// Density per area at `y` of points that cosine-distributed directions from `x` hit.
+fn pdf_cosine(x: Surface, y: Surface) -> f32 {
+    return coupling(x, y) / PI;
+}
+
+const NO_LIGHT: u32 = 0xffffffffu;
+
+// A light, in proportion to its power; none if all are dark.
+fn choose_light() -> u32 {
+    var rest = random();
+    var chosen = NO_LIGHT;
+    for (var i = 0u; i < scene_info.light_count; i++) {
+        let share = scene_lights[i].share;
+        if share > 0.0 {
+            // The last one also has what rounding leaves.
+            chosen = i;
+            if rest < share {
+                break;
+            }
+            rest -= share;
+        }
+    }
+    return chosen;
+}
+
+// A ray from a light: in its cone or sphere, or from its disk. Of unit length.
+fn light_ray(light: Light, u: vec2f) -> Ray {
+    let angle = 2.0 * PI * u.x;
+    let around = vec2f(cos(angle), sin(angle));
+    let axes = basis(light.direction);
+    if light.kind == LIGHT_DIRECTIONAL {
+        let on_disk = light.radius * sqrt(u.y) * around;
+        return make_ray(light.position + axes * vec3f(on_disk, 0.0), light.direction);
+    }
+    let s = sin(0.5 * light.cutoff_rad);
+    let one_minus_cos = u.y * 2.0 * s * s;
     let r = sqrt(max(one_minus_cos * (2.0 - one_minus_cos), 0.0));
-    return basis(scene_light.direction) * vec3f(r * cos(angle), r * sin(angle), 1.0 - one_minus_cos);
+    return make_ray(light.position, axes * vec3f(r * around, 1.0 - one_minus_cos));
 }
 
-fn cosine_direction(normal: vec3f) -> vec3f {
-    let r2 = random();
-    let angle = 2.0 * PI * random();
-    let r = sqrt(r2);
-    return basis(normal) * vec3f(r * cos(angle), r * sin(angle), sqrt(max(1.0 - r2, 0.0)));
+fn cosine_direction(normal: vec3f, u: vec2f) -> vec3f {
+    let angle = 2.0 * PI * u.x;
+    let r = sqrt(u.y);
+    return basis(normal) * vec3f(r * cos(angle), r * sin(angle), sqrt(max(1.0 - u.y, 0.0)));
 }
 
-// One bounce by way of a point that a ray in the light's cone hits.
-fn bounce_from_cone(x: Surface) -> vec3f {
-    let ray = make_ray(scene_light.position, uniform_in_cone());
+// One bounce by way of a point that a ray from a light hits.
+fn bounce_from_light(x: Surface, bounce: u32) -> vec3f {
+    let chosen = choose_light();
+    if chosen == NO_LIGHT {
+        return vec3f(0.0);
+    }
+    let light = scene_lights[chosen];
+    let ray = light_ray(light, random_pair(FROM_LIGHT, bounce));
     let hit = intersect(ray, MISSED, false);
     if hit.t >= MISSED {
         return vec3f(0.0);
     }
     var y = surface_at(ray, hit);
-    let cos_light = dot(y.normal, y.to_viewer);
-    let to_x = x.position - y.position;
-    let d2 = dot(to_x, to_x);
-    let direction = to_x * inverseSqrt(max(d2, 1e-30));
-    let cos_x = -dot(x.normal, direction);
-    let cos_y = dot(y.normal, direction);
-    if cos_x <= 0.0 || cos_y <= 0.0 || dot(x.geometric, direction) >= 0.0 || dot(y.geometric, direction) <= 0.0 || cos_light <= 0.0 || !visible(lift(x), lift(y)) {
+    let to_x = towards(y.position, x.position);
+    let arrival = light_at(light, y.position);
+    y.to_viewer = to_x;
+    let between = coupling(x, y);
+    let radiance = reflected(y, arrival);
+    if between <= 0.0 || dot(x.geometric, to_x) >= 0.0 || max_component(radiance) <= 0.0 || !sees(x, lift(y)) {
         return vec3f(0.0);
     }
-    let l2 = hit.t * hit.t; // the cone's directions have unit length
-    let irradiance = scene_light.intensity * (spot_falloff(scene_light, ray.direction) * cos_light / max(l2, 1e-30));
-    let to_light = y.to_viewer;
-    y.to_viewer = direction;
-    let pdf = pdf_cone(cos_light, l2);
-    let other = pdf_cosine(cos_x, cos_y, d2);
     // Integrand over the pdf, times the balance heuristic's weight pdf / (pdf + other).
-    return brdf(x, -direction) * brdf(y, to_light) * irradiance * (cos_x * cos_y / max(d2, 1e-30) / (pdf + other));
+    return brdf(x, -to_x) * radiance * (between / (pdf_light(y, arrival) + pdf_cosine(x, y)));
 }
 
-// Weight of a bounce that was found by a cosine-distributed direction: what the cone could have found counts less.
-fn weight_of_cosine(x: Surface, y: Surface) -> f32 {
-    let to_x = x.position - y.position;
-    let d2 = dot(to_x, to_x);
-    let direction = to_x * inverseSqrt(max(d2, 1e-30));
-    let own = pdf_cosine(max(-dot(x.normal, direction), 0.0), max(dot(y.normal, direction), 0.0), d2);
-    let to_light = scene_light.position - y.position;
-    let l2 = dot(to_light, to_light);
-    let other = pdf_cone(max(dot(y.normal, to_light * inverseSqrt(max(l2, 1e-30))), 0.0), l2);
-    return own / max(own + other, 1e-30);
+// Radiance that `y`, which a cosine-distributed direction from `x` hit, sends to `x` of the lights themselves. What a ray from a light
+// could have found counts less: each light has a weight of its own, as it has a density of its own.
+fn weighted_direct(x: Surface, y: Surface) -> vec3f {
+    let own = pdf_cosine(x, y);
+    var radiance = vec3f(0.0);
+    for (var i = 0u; i < scene_info.light_count; i++) {
+        let light = scene_lights[i];
+        let arrival = light_at(light, y.position);
+        radiance += direct_of(y, light, arrival) * (own / max(own + pdf_light(y, arrival), 1e-30));
+    }
+    return radiance;
 }
 
 fn path(pixel: vec2u, size: vec2u) -> vec3f {
-    let uv = (vec2f(pixel) + vec2f(random(), random())) / vec2f(size);
+    let uv = (vec2f(pixel) + random_pair(IN_PIXEL, 0u)) / vec2f(size);
     var ray = make_ray(scene_camera.origin, ray_direction(scene_camera, uv));
     var hit = intersect(ray, MISSED, false);
     if hit.t >= MISSED {
@@ -203,8 +269,8 @@ fn path(pixel: vec2u, size: vec2u) -> vec3f {
     var throughput = vec3f(1.0);
     let bounces = select(1u, params.max_bounces, component_is_full);
     for (var bounce = 0u; bounce < bounces; bounce++) {
-        radiance += throughput * bounce_from_cone(x);
-        let direction = cosine_direction(x.normal);
+        radiance += throughput * bounce_from_light(x, bounce);
+        let direction = cosine_direction(x.normal, random_pair(NEXT, bounce));
         if dot(direction, x.geometric) <= 0.0 {
             break;
         }
@@ -216,7 +282,7 @@ fn path(pixel: vec2u, size: vec2u) -> vec3f {
         // brdf × cos / (cos / π)
         throughput *= brdf(x, direction) * PI;
         let y = surface_at(ray, hit);
-        radiance += throughput * direct(y) * weight_of_cosine(x, y);
+        radiance += throughput * weighted_direct(x, y);
         x = y;
         if bounce + 1u >= ROULETTE_FROM {
             let survival = min(max_component(throughput), MOST_SURVIVAL);
@@ -235,9 +301,10 @@ fn trace(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size) {
         return;
     }
-    random_state = hash3(id.x + id.y * size.x, frame.index, frame.seed);
+    pixel_seed = hash3(id.x + id.y * size.x, frame.index, frame.seed);
+    random_state = pixel_seed;
     var sum = vec3f(0.0);
-    for (var i = 0u; i < params.paths; i++) {
+    for (path_index = 0u; path_index < params.paths; path_index++) {
         sum += path(id.xy, size);
     }
     textureStore(traced, id.xy, vec4f(sum / f32(params.paths), 1.0));

@@ -201,3 +201,24 @@ fn comparing_pictures_of_different_sizes_is_refused() {
     manylight_in(folder.path(), &["compare", "a.exr", "b.exr"]).expect(1).says(&["16", "8"]);
     manylight_in(folder.path(), &["compare", "a.exr", "a.exr"]).expect(0);
 }
+
+#[test]
+fn lights_that_a_pipeline_does_not_render_are_told() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scene = folder.path().join("lights.ron");
+    let mesh = root().join("assets/cornell.obj");
+    let (point, sun) = ("Point(position: (2, 4, 2), intensity: 5)", "Directional(direction: (0, -1, 1), irradiance: 5)");
+    let spot = "Spot(position: (2, 4, 2), target: (2, 0, 2), intensity: 5, beam_deg: 10, cutoff_deg: 20)";
+    let render = |pipeline: &str, lights: &[&str]| {
+        let lights = lights.join(", ");
+        fs::write(&scene, format!("Scene(meshes: [{:?}], lights: [{lights}])", mesh.to_string_lossy())).expect("written");
+        let (scene, out) = (scene.to_string_lossy(), folder.path().join("out.png"));
+        manylight(&[&["render", pipeline, "--scene", &scene, "--out", &out.to_string_lossy()][..], &SMALL[..]].concat()).expect(0)
+    };
+    render("acrsm", &[sun, spot, point, spot, spot]).says(&["only the first spot light", "2 spot, 1 point, 1 directional", "`reference`"]);
+    render("acrsm", &[point]).says(&["which the scene does not have", "not rendered: 1 point"]);
+    for (pipeline, lights) in [("acrsm", &[spot][..]), ("reference", &[sun, spot, point, spot])] {
+        let stderr = render(pipeline, lights).stderr;
+        assert!(!stderr.contains("not rendered"), "{pipeline}: {stderr}");
+    }
+}

@@ -4,6 +4,7 @@
 mod cli;
 mod clustering;
 mod determinism;
+mod lights;
 mod metrics;
 mod moving_light;
 mod path_tracer;
@@ -12,5 +13,6 @@ mod renders;
 mod samples;
 mod support;
 mod sweeps;
+mod twin;
 mod visibility;
 mod walkthrough;

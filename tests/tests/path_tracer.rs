@@ -28,8 +28,11 @@ const FULL: (&str, &str) = ("full", "full");
 /// rarely bright, which a z-test needs.
 const BLOCK: u32 = 8;
 
+/// Mean and standard error.
+pub type Block = ([f64; 3], [f64; 3]);
+
 /// Means and standard errors of blocks; pixels are independent.
-fn blocks(size: u32, value: impl Fn(u32, u32) -> [f64; 3], error: impl Fn(u32, u32) -> [f64; 3]) -> Vec<([f64; 3], [f64; 3])> {
+pub fn blocks(size: u32, value: impl Fn(u32, u32) -> [f64; 3], error: impl Fn(u32, u32) -> [f64; 3]) -> Vec<Block> {
     let mut blocks = Vec::new();
     for by in 0..size / BLOCK {
         for bx in 0..size / BLOCK {
@@ -51,7 +54,22 @@ fn blocks(size: u32, value: impl Fn(u32, u32) -> [f64; 3], error: impl Fn(u32, u
 }
 
 /// Share of blocks and channels whose difference is beyond four standard errors (normal: 6 in 100,000), and the ratio of the means.
-/// `scale` multiplies the tracer's radiance: 1 but for the test of the test.
+pub fn compare(mine: &[Block], theirs: &[Block]) -> (f64, f64) {
+    let total = |blocks: &[Block]| blocks.iter().flat_map(|(mean, _)| *mean).sum::<f64>();
+    let ratio = total(mine) / total(theirs);
+    // Rounding of f32 sums and of the references' half-float errors.
+    let floor = 1e-4 * total(theirs) / (3 * theirs.len()) as f64;
+    let mut beyond = 0;
+    for (a, b) in mine.iter().zip(theirs) {
+        for i in 0..3 {
+            let deviation = (a.1[i].powi(2) + b.1[i].powi(2) + floor * floor).sqrt();
+            beyond += usize::from((a.0[i] - b.0[i]).abs() > 4.0 * deviation);
+        }
+    }
+    (beyond as f64 / (3 * mine.len()) as f64, ratio)
+}
+
+/// What [`compare`] says of the tracer and a reference. `scale` multiplies the tracer's radiance: 1 but for the test of the test.
 fn disagreement(case: &Case, scale: f64) -> (f64, f64) {
     let job = Job { pipeline: root().join("pipelines/reference.ron").to_string_lossy().into_owned(), ..Job::scene(&case.scene) }
         .set("component", case.component.0)
@@ -64,18 +82,7 @@ fn disagreement(case: &Case, scale: f64) -> (f64, f64) {
     let reference_error = exr(&case.reference.join(format!("{}_stderr.exr", case.component.1)));
     let mine = blocks(mean.width, |x, y| rgb(&mean, x, y).map(|v| scale * v), |x, y| rgb(&error, x, y));
     let theirs = blocks(mean.width, |x, y| reference_rgb(&reference, x, y), |x, y| reference_rgb(&reference_error, x, y));
-    let total = |blocks: &[([f64; 3], [f64; 3])]| blocks.iter().flat_map(|(mean, _)| *mean).sum::<f64>();
-    let ratio = total(&mine) / total(&theirs);
-    // Rounding of f32 sums and of the references' half-float errors.
-    let floor = 1e-4 * total(&theirs) / (3 * theirs.len()) as f64;
-    let mut beyond = 0;
-    for (a, b) in mine.iter().zip(&theirs) {
-        for i in 0..3 {
-            let deviation = (a.1[i].powi(2) + b.1[i].powi(2) + floor * floor).sqrt();
-            beyond += usize::from((a.0[i] - b.0[i]).abs() > 4.0 * deviation);
-        }
-    }
-    (beyond as f64 / (3 * mine.len()) as f64, ratio)
+    compare(&mine, &theirs)
 }
 
 #[test]

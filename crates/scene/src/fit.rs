@@ -6,7 +6,7 @@ use crate::{
     bounds::Bounds,
     gpu_data::Falloff,
     motion::{CameraPose, LightPose, Track},
-    scene::Light,
+    scene::{Light, LightShape},
 };
 
 /// Horizontal field of view of a fitted camera in degrees.
@@ -38,6 +38,6 @@ pub(crate) fn light(bounds: &Bounds) -> Light {
     let mut offset = 0.5 * bounds.size() * LIGHT_PLACE;
     offset.y = offset.y.max(LEAST_HEIGHT * bounds.diagonal());
     let intensity = std::f64::consts::PI * offset.length_squared();
-    let pose = LightPose { position: (target + offset).as_vec3(), target: target.as_vec3(), intensity: Vec3::splat(intensity as f32) };
-    Light { pose: Track::fixed(pose), beam_deg: 35.0, cutoff_deg: 50.0, falloff: Falloff::Linear }
+    let pose = LightPose { position: (target + offset).as_vec3(), target: target.as_vec3(), strength: Vec3::splat(intensity as f32) };
+    Light { pose: Track::fixed(pose), shape: LightShape::Spot { beam_deg: 35.0, cutoff_deg: 50.0, falloff: Falloff::Linear } }
 }

@@ -45,22 +45,42 @@ pub enum Falloff {
     Smooth = 2,
 }
 
-/// A spot light.
+/// Where a light's rays come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum LightKind {
+    /// A point, in a cone.
+    Spot = 0,
+    /// A point, in all directions alike.
+    Point = 1,
+    /// Far away: they are parallel.
+    Directional = 2,
+}
+
+/// A light.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct SpotLight {
-    /// World space.
+pub struct Light {
+    /// World space. Of a directional light: the middle of a disk across its rays, before the scene and as wide as all of it.
     pub position: Vec3,
-    /// Half-angle of full intensity.
-    pub beam_rad: f32,
-    /// Unit vector along the axis.
+    /// A [`LightKind`].
+    pub kind: u32,
+    /// Unit vector along the axis of a spot light, and along the rays of a directional one.
     pub direction: Vec3,
-    /// Half-angle beyond which it is dark.
-    pub cutoff_rad: f32,
-    /// W/sr.
-    pub intensity: Vec3,
-    /// A [`Falloff`].
+    /// A [`Falloff`], of a spot light.
     pub falloff: u32,
+    /// Intensity along the axis in W/sr. Of a directional light: irradiance of a surface that faces it, in W/m².
+    pub strength: Vec3,
+    /// Half-angle of full intensity; π for a point light.
+    pub beam_rad: f32,
+    /// Half-angle beyond which it is dark; π for a point light.
+    pub cutoff_rad: f32,
+    /// Of a directional light's disk.
+    pub radius: f32,
+    /// Its part of the power of all lights: the probability with which a path tracer sends a ray from it.
+    pub share: f32,
+    /// `share` over what its rays are spread over: the solid angle of the cone or sphere in sr, or the area of the disk in m².
+    pub ray_density: f32,
 }
 
 /// Counters and sizes of the frame.
@@ -273,7 +293,7 @@ pub fn layouts() -> Vec<(&'static str, Layout)> {
         layout!(BvhNode { low, first, high, count }),
         layout!(BvhTriangle { a, index, ab, material, ac, object }),
         layout!(View { clip_from_world, origin, near, right, tan_half_x, up, tan_half_y, forward, far }),
-        layout!(SpotLight { position, beam_rad, direction, cutoff_rad, intensity, falloff }),
+        layout!(Light { position, kind, direction, falloff, strength, beam_rad, cutoff_rad, radius, share, ray_density }),
         layout!(Frame { index, seed, time, delta_time }),
         layout!(SceneInfo {
             bounds_min,

@@ -1,4 +1,4 @@
-//! Scenes for manylight: meshes, materials, textures, spot lights, a camera and their motion, read from RON, OBJ, MTL and picture files into
+//! Scenes for manylight: meshes, materials, textures, lights, a camera and their motion, read from RON, OBJ, MTL and picture files into
 //! the structures that shaders read.
 //!
 //! ```
@@ -10,7 +10,7 @@
 //!
 //! let state = scene.sample(2.5);
 //! let view = state.camera_view(16.0 / 9.0);
-//! assert!(view.forward.is_normalized() && state.light().intensity.x > 0.0);
+//! assert!(view.forward.is_normalized() && state.light().strength.x > 0.0);
 //! # Ok::<(), manylight_graph::diagnostics::Diagnostics>(())
 //! ```
 //!
@@ -41,14 +41,17 @@
 //!     lights: [
 //!         Spot(position: (0.0, 2.0, 0.0), target: (0.0, 0.0, 0.0), intensity: (9.0, 9.0, 9.0), // W/sr; or one number
 //!              beam_deg: 20.0, cutoff_deg: 30.0, falloff: linear), // half-angles; linear, cosine or smooth
+//!         Point(position: (0.0, 1.0, 0.0), intensity: 2.0),             // W/sr in all directions
+//!         Directional(direction: (1.0, -2.0, 0.0), irradiance: 3.0),    // the way its light goes; W/m² on a surface that faces it
 //!     ],
 //!     materials: {"white": (diffuse: (0.7, 0.7, 0.7), specular: 0.2, shininess: 50.0, texture: "wood.png")},
 //! )
 //! ```
 //!
 //! Only `meshes` is needed. A camera or a light that is missing is fitted to the meshes, with a warning. `rotate_deg` may also be three angles:
-//! about x, then y, then z. Cameras (`origin`, `target`, `up`, `fov_x_deg`) and lights (`position`, `target`, `intensity`) take `motion` and
-//! `repeat` in the same way. Values are mixed linearly from key to key, rotations on the shortest arc.
+//! about x, then y, then z. Cameras (`origin`, `target`, `up`, `fov_x_deg`) and lights (`position`, `target`, `intensity`; `direction`,
+//! `irradiance`) take `motion` and `repeat` in the same way. Values are mixed linearly from key to key, rotations and directions on the
+//! shortest arc.
 
 pub mod bounds;
 pub mod bvh;
@@ -57,6 +60,7 @@ pub mod files;
 mod fit;
 pub mod gpu_data;
 mod import;
+mod lights;
 pub mod motion;
 pub mod points;
 mod random;
@@ -64,5 +68,5 @@ pub mod scene;
 pub mod state;
 
 pub use import::{DEFAULT_SHININESS, MAX_TEXTURE_SIZE, Material, Mesh, MeshStatistics, MeshTriangle, Textures};
-pub use scene::{Light, Scene, SceneObject};
+pub use scene::{Light, LightShape, Scene, SceneObject};
 pub use state::SceneState;

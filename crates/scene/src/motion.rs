@@ -104,12 +104,12 @@ impl Interpolate for Pose {
 /// What of a light can move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightPose {
-    /// World space.
+    /// World space. A directional light has none: zero, so that its target is its direction.
     pub position: Vec3,
-    /// A point on the axis, world space.
+    /// A point on the axis, world space; without meaning for a point light.
     pub target: Vec3,
-    /// W/sr along the axis.
-    pub intensity: Vec3,
+    /// Intensity along the axis in W/sr; of a directional light the irradiance of a surface that faces it, in W/m².
+    pub strength: Vec3,
 }
 
 impl LightPose {
@@ -124,7 +124,7 @@ impl Interpolate for LightPose {
         Self {
             position: self.position.lerp(other.position, fraction),
             target: self.target.lerp(other.target, fraction),
-            intensity: self.intensity.lerp(other.intensity, fraction),
+            strength: self.strength.lerp(other.strength, fraction),
         }
     }
 }

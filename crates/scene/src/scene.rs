@@ -36,17 +36,31 @@ pub(crate) struct Extent {
     pub(crate) area: f64,
 }
 
-/// A spot light.
+/// A light.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Light {
     /// Where it is, where it points and how strong it is.
     pub pose: Track<LightPose>,
-    /// Half-angle of full intensity in degrees.
-    pub beam_deg: f32,
-    /// Half-angle beyond which it is dark, in degrees; below 90.
-    pub cutoff_deg: f32,
-    /// Between the two.
-    pub falloff: Falloff,
+    /// Where its rays go.
+    pub shape: LightShape,
+}
+
+/// Where a light's rays go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LightShape {
+    /// From a point into a cone.
+    Spot {
+        /// Half-angle of full intensity in degrees.
+        beam_deg: f32,
+        /// Half-angle beyond which it is dark, in degrees; below 90.
+        cutoff_deg: f32,
+        /// Between the two.
+        falloff: Falloff,
+    },
+    /// From a point in all directions alike.
+    Point,
+    /// All the same way, from far away.
+    Directional,
 }
 
 /// Everything there is to render, over all time. [`Scene::sample`] gives it at one time.

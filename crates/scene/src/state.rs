@@ -4,10 +4,11 @@ use glam::{DMat3, DMat4, DVec3, Mat4};
 
 use crate::{
     bounds::Bounds,
-    gpu_data::{Object, SceneInfo, SpotLight, View},
+    gpu_data::{Light, LightKind, Object, SceneInfo, View},
     import::Mesh,
+    lights,
     motion::{CameraPose, LightPose, Pose},
-    scene::{Extent, Light, Scene},
+    scene::{Extent, Scene},
 };
 
 /// Everything that changes with time, ready for the GPU.
@@ -17,8 +18,8 @@ pub struct SceneState {
     pub time: f64,
     /// Where the objects are.
     pub objects: Vec<Object>,
-    /// The lights.
-    pub lights: Vec<SpotLight>,
+    /// The lights, with their shares of the power.
+    pub lights: Vec<Light>,
     /// The camera; [`SceneState::camera_view`] makes a view of it.
     pub camera: CameraPose,
     /// Around all objects, world space. Tight around objects that stand still, loose around others.
@@ -70,7 +71,7 @@ impl Scene {
         SceneState {
             time,
             objects,
-            lights: self.lights.iter().zip(&light_poses).map(|(light, pose)| spot_light(light, pose)).collect(),
+            lights: lights::on_gpu(&self.lights, &light_poses, &bounds),
             camera: self.camera.at(time),
             bounds,
             info,
@@ -92,48 +93,28 @@ impl SceneState {
         View::perspective(origin, target, up, fov_x_deg.to_radians(), aspect, near as f32, self.far(origin.as_dvec3()))
     }
 
-    /// The first light, or a dark one if the scene has none.
-    pub fn light(&self) -> SpotLight {
-        self.lights.first().copied().unwrap_or_else(|| {
-            let position = self.bounds.centre().as_vec3();
-            let (beam_rad, cutoff_rad) = (DARK_BEAM_RAD, DARK_CUTOFF_RAD);
-            SpotLight { position, beam_rad, direction: glam::Vec3::NEG_Y, cutoff_rad, intensity: glam::Vec3::ZERO, falloff: 0 }
-        })
+    /// The first spot light, or a dark one if the scene has none.
+    pub fn light(&self) -> Light {
+        self.first_spot().map_or_else(|| lights::dark(&self.bounds), |index| self.lights[index])
     }
 
-    /// The first light (or the dark one) as a square view whose full field of view is twice the cut-off.
+    /// The first spot light (or the dark one) as a square view whose full field of view is twice the cut-off.
     pub fn light_view(&self) -> View {
-        self.light_view_of(0)
-    }
-
-    /// A light as a square view whose full field of view is twice the cut-off.
-    pub fn light_view_of(&self, index: usize) -> View {
-        let light = self.lights.get(index).copied().unwrap_or_else(|| self.light());
+        let light = self.light();
         let origin = light.position;
-        let target = self.light_poses.get(index).map(|pose| pose.target).filter(|target| *target != origin);
+        let target = self.first_spot().map(|index| self.light_poses[index].target).filter(|target| *target != origin);
         let target = target.unwrap_or(origin + light.direction * self.info.diagonal);
         let near = (NEAR * self.bounds.diagonal()) as f32;
         View::perspective(origin, target, glam::Vec3::Y, 2.0 * light.cutoff_rad, 1.0, near, self.far(origin.as_dvec3()))
     }
 
+    fn first_spot(&self) -> Option<usize> {
+        self.lights.iter().position(|light| light.kind == LightKind::Spot as u32)
+    }
+
     /// A distance from a point beyond everything in the scene.
     fn far(&self, origin: DVec3) -> f32 {
         (2.0 * (self.bounds.diagonal() + self.bounds.distance(origin))) as f32
-    }
-}
-
-/// Cone of the light of a scene without lights.
-const DARK_BEAM_RAD: f32 = 0.5;
-const DARK_CUTOFF_RAD: f32 = 0.6;
-
-fn spot_light(light: &Light, pose: &LightPose) -> SpotLight {
-    SpotLight {
-        position: pose.position,
-        beam_rad: light.beam_deg.to_radians(),
-        direction: pose.direction(),
-        cutoff_rad: light.cutoff_deg.to_radians(),
-        intensity: pose.intensity,
-        falloff: light.falloff as u32,
     }
 }
 

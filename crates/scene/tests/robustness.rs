@@ -6,7 +6,7 @@ use crate::memory::load;
 
 const OBJ: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0 1\nv 0 1 0 1 0 0\nv 0 0 1\nvt 0 0\nvt 1\nvn 0 0 1\nusemtl a\nf 1/1/1 2/2/1 3/1/1\ng x\nusemtl b c\nf 1//1 2//1 4//1\nf -1 -2 -3 -4\nl 1 2\np 1\n";
 const MTL: &str = "newmtl a\nKd 0.5 0.5 0.5\nKs 0.1 0.1 0.1\nNs 10\nillum 2\nmap_Kd -s 1 1 1 t.png\nnewmtl b c\nKd 1 0 0\nKe 0 0 0\n";
-const RON: &str = "Scene(meshes: [\"a.obj\", Mesh(file: \"a.obj\", transform: (translate: (1, 2, 3), rotate_deg: (axis: (0, 1, 0), angle: 30)), motion: [(time: 0.0), (time: 1.5, scale: 2.0)], repeat: loop)], camera: (origin: (0, 0, 9), target: (0, 0, 0), fov_x_deg: 40.0), lights: [Spot(position: (0, 1, 0), target: (0, 0, 0), intensity: (1, 2, 3), beam_deg: 10, cutoff_deg: 20, falloff: smooth)], materials: {\"a\": (diffuse: 0.5)})";
+const RON: &str = "Scene(meshes: [\"a.obj\", Mesh(file: \"a.obj\", transform: (translate: (1, 2, 3), rotate_deg: (axis: (0, 1, 0), angle: 30)), motion: [(time: 0.0), (time: 1.5, scale: 2.0)], repeat: loop)], camera: (origin: (0, 0, 9), target: (0, 0, 0), fov_x_deg: 40.0), lights: [Spot(position: (0, 1, 0), target: (0, 0, 0), intensity: (1, 2, 3), beam_deg: 10, cutoff_deg: 20, falloff: smooth), Point(position: (0, 1, 0), intensity: 2), Directional(direction: (0, -1, 0), irradiance: 3, motion: [(time: 0), (time: 1, direction: (0, 1, 0))])], materials: {\"a\": (diffuse: 0.5)})";
 
 /// A text with some bytes replaced, put in, or taken out.
 fn mutated(text: &'static str) -> impl Strategy<Value = Vec<u8>> {
@@ -70,6 +70,9 @@ fn check(path: &str, obj: &[u8], mtl: &[u8], ron: &[u8]) -> Result<(), TestCaseE
         let state = scene.sample(time);
         prop_assert!(state.info.diagonal.is_finite() && state.info.diagonal > 0.0 || state.bounds.diagonal() > 1e30);
         prop_assert!(state.camera_view(1.5).forward.is_finite() && state.light_view().forward.is_finite());
+        prop_assert!(
+            state.lights.iter().all(|light| light.direction.is_finite() && light.share.is_finite() && light.ray_density.is_finite())
+        );
         prop_assert!(state.objects.iter().all(|object| object.normal_from_object.is_finite()));
     }
     Ok(())

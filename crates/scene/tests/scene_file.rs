@@ -1,7 +1,7 @@
 //! Scene files: what they may say, and every fault with its place.
 
 use glam::{Quat, Vec3};
-use manylight_scene::{Scene, files::Embedded, gpu_data::Falloff};
+use manylight_scene::{LightShape, Scene, files::Embedded, gpu_data::Falloff};
 
 use crate::memory::{ROOM, TRIANGLE, assert_says, load, ron, summary};
 
@@ -17,6 +17,8 @@ fn a_whole_scene() {
         lights: [
             Spot(position: (0.0, 0.9, 0.0), target: (0.0, 0.0, 0.0), intensity: (1.0, 2.0, 3.0), beam_deg: 15.0, cutoff_deg: 20.0, falloff: smooth),
             Spot(position: (0.0, 0.9, 0.0), target: (0.0, 0.0, 1.0), intensity: 4.0, beam_deg: 0.0, cutoff_deg: 89.0),
+            Point(position: (1.0, 2.0, 3.0), intensity: (4.0, 5.0, 6.0)),
+            Directional(direction: (0, -2, 0), irradiance: 7),
         ],
         materials: {\"walls\": (diffuse: (0.1, 0.2, 0.3), specular: 0.4, shininess: 9)},
     )")
@@ -27,9 +29,14 @@ fn a_whole_scene() {
     assert_eq!((pose.translate, pose.scale), (Vec3::new(1.0, 2.0, 3.0), Vec3::splat(2.0)));
     assert!(pose.rotate.angle_between(Quat::from_rotation_y(90_f32.to_radians())) < 1e-3);
     assert_eq!(scene.camera.at(0.0).fov_x_deg, 62.0);
-    assert_eq!(scene.lights[0].falloff, Falloff::Smooth);
-    assert_eq!(scene.lights[1].falloff, Falloff::Linear);
-    assert_eq!(scene.lights[1].pose.at(0.0).intensity, Vec3::splat(4.0));
+    let spot = |beam_deg, cutoff_deg, falloff| LightShape::Spot { beam_deg, cutoff_deg, falloff };
+    let shapes: Vec<_> = scene.lights.iter().map(|light| light.shape).collect();
+    let spots = [spot(15.0, 20.0, Falloff::Smooth), spot(0.0, 89.0, Falloff::Linear)];
+    assert_eq!(shapes, [spots[0], spots[1], LightShape::Point, LightShape::Directional]);
+    let pose = |index: usize| scene.lights[index].pose.at(0.0);
+    assert_eq!(pose(1).strength, Vec3::splat(4.0));
+    assert_eq!((pose(2).position, pose(2).strength), (Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)));
+    assert_eq!((pose(3).direction(), pose(3).strength), (Vec3::NEG_Y, Vec3::splat(7.0)));
     let walls = scene.materials.iter().find(|m| m.name == "walls").unwrap();
     assert_eq!((walls.diffuse, walls.specular, walls.shininess), (Vec3::new(0.1, 0.2, 0.3), Vec3::splat(0.4), 9.0));
     let features = scene.features();
@@ -43,6 +50,7 @@ fn a_whole_scene() {
 fn every_fault_has_its_place() {
     let mesh = "meshes: [\"tri.obj\"]";
     let spot = |changed: &str, to: &str| format!("Scene({mesh}, lights: [Spot({})])", SPOT.replace(changed, to));
+    let light = |light: &str| format!("Scene({mesh}, lights: [{light}])");
     let camera = |changed: &str, to: &str| format!("Scene({mesh}, {})", CAMERA.replace(changed, to));
     let object = |rest: &str| format!("Scene(meshes: [Mesh(file: \"tri.obj\", {rest})])");
     let cases: Vec<(String, &str, &[&str])> = vec![
@@ -72,7 +80,31 @@ fn every_fault_has_its_place() {
         (spot("5.0", "5.0, falloff: linea"), "linea", &["unknown falloff `linea`", "linear"]),
         (spot("5.0", "5.0, falloff: 3"), "3", &["expected `linear`"]),
         (spot("5.0", "5.0, colour: 3"), "colour", &["unknown field `colour` in a spot light"]),
-        (format!("Scene({mesh}, lights: [Sport({SPOT})])"), "Sport", &["Spot"]),
+        (light(&format!("Sport({SPOT})")), "Sport", &["expected `Spot(…)` or `Point(…)` or `Directional(…)`", "did you mean `Spot`?"]),
+        (light("Poimt(position: (0, 1, 0), intensity: 5)"), "Poimt", &["did you mean `Point`?"]),
+        (light("Sun(direction: (0, -1, 0), irradiance: 5)"), "Sun", &["`Spot`, `Point`, `Directional`"]),
+        (light("3"), "3", &["expected `Spot(…)`", "`Directional(direction: …, irradiance: …)`"]),
+        (light("Point(position: (0, 1, 0))"), "Point", &["missing field `intensity`"]),
+        (light("Point(position: (0, 1, 0), intensity: 5, target: (0, 0, 0))"), "target", &["unknown field `target` in a point light"]),
+        (light("Point(position: (0, 1, 0), intensity: -5)"), "-5", &["-5 is out of range", "not negative"]),
+        (
+            light("Point(position: (0, 1, 0), intensity: 5, motion: [(time: 0, target: (0, 0, 0))])"),
+            "target",
+            &["unknown field `target` in a key frame of a point light"],
+        ),
+        (light("Directional(direction: (0, -1, 0))"), "Directional", &["missing field `irradiance`"]),
+        (light("Directional(direction: (0, 0, 0), irradiance: 5)"), "(0, 0, 0)", &["the direction is zero"]),
+        (light("Directional(direction: (0, -1, 0), irradiance: (1, 2))"), "(1, 2)", &["expected three numbers, found 2"]),
+        (
+            light("Directional(direction: (0, -1, 0), irradiance: 5, intensity: 5)"),
+            "intensity",
+            &["unknown field `intensity`", "irradiance"],
+        ),
+        (
+            light("Directional(direction: (0, -1, 0), irradiance: 5, motion: [(time: 0, direction: (0, 0, 0))])"),
+            "(0, 0, 0)",
+            &["the direction is zero"],
+        ),
         (camera("(0.0, 0.0, 5.0)", "(0.0, 0.0, 0.0)"), "(", &["the camera is on its target"]),
         (camera("target", "up: (0.0, 0.0, -2.0), target"), "(0.0, 0.0, -2.0)", &["the camera looks along `up`"]),
         (camera("target", "up: (0.0, 0.0, 0.0), target"), "(0.0, 0.0, 0.0)", &["the direction is zero"]),
@@ -135,6 +167,32 @@ fn warnings_that_do_not_stop() {
     assert_says(&scene.warnings, "(", &["the short way round", "180°"]);
     assert_says(&scene.warnings, "", &["the scene has no camera"]);
     assert_says(&scene.warnings, "", &["the scene has no light"]);
+}
+
+#[test]
+fn a_sun_without_a_key_at_noon_is_warned_of() {
+    let sun = |noon: &str| {
+        let motion = format!("[(time: 0, direction: (3, 0, 0)), {noon} (time: 2, direction: (-1, 0, 0))]");
+        let light = format!("Directional(direction: (0, -1, 0), irradiance: 5, motion: {motion})");
+        ron(&format!("Scene(meshes: [\"tri.obj\"], {CAMERA}, lights: [{light}])")).unwrap()
+    };
+    assert_says(&sun("").warnings, "(", &["from [1, 0, 0] to [-1, 0, 0] is half a turn", "put a key frame between them"]);
+    let scene = sun("(time: 1, irradiance: 9),");
+    assert_eq!(scene.warnings.0.len(), 0);
+    assert!(scene.features()["moving_lights"]);
+    // Keys of different lengths are mixed alike: a quarter of the way is 45° down.
+    let light = scene.sample(0.5).lights[0];
+    assert!(light.direction.distance(Vec3::new(1.0, -1.0, 0.0).normalize()) < 1e-6, "{}", light.direction);
+    assert_eq!(light.strength, Vec3::splat(7.0));
+}
+
+/// A warning took the camera or the light away, so that another one was fitted, or the picture black.
+#[test]
+fn a_warning_about_a_camera_or_a_light_does_not_drop_it() {
+    let camera = CAMERA.replace("target", "repeat: loop, target");
+    let scene = ron(&format!("Scene(meshes: [\"tri.obj\"], {camera}, lights: [Spot({SPOT}, repeat: loop)])")).unwrap();
+    assert_eq!(scene.warnings.0.len(), 2, "{:?}", summary(&scene.warnings));
+    assert_eq!((scene.camera.at(0.0).origin, scene.lights.len()), (Vec3::new(0.0, 0.0, 5.0), 1));
 }
 
 #[test]

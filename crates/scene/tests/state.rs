@@ -1,7 +1,7 @@
 //! Scenes at a time.
 
 use glam::Vec3;
-use manylight_scene::gpu_data::Falloff;
+use manylight_scene::gpu_data::{Falloff, LightKind};
 
 use crate::memory::{obj, ron};
 
@@ -65,7 +65,7 @@ fn the_light_moves_and_its_view_is_its_cone() {
     let state = scene.sample(0.5);
     let light = state.light();
     assert_eq!(light.position, Vec3::new(0.5, 0.0, 0.0));
-    assert_eq!(light.intensity, Vec3::new(3.0, 4.0, 5.0));
+    assert_eq!(light.strength, Vec3::new(3.0, 4.0, 5.0));
     assert_eq!(light.falloff, Falloff::Cosine as u32);
     assert!(light.direction.distance(Vec3::new(0.0, -0.5, 0.5).normalize()) < 1e-6);
     let view = state.light_view();
@@ -73,6 +73,49 @@ fn the_light_moves_and_its_view_is_its_cone() {
     assert!((view.tan_half_x - 30_f32.to_radians().tan()).abs() < 1e-6 && view.tan_half_x == view.tan_half_y);
     assert!((light.cutoff_rad - 30_f32.to_radians()).abs() < 1e-6);
     assert!(scene.features()["moving_lights"] && !scene.features()["several_lights"]);
+}
+
+#[test]
+fn lights_share_their_power() {
+    let spot = "Spot(position: (0, 0, 0), target: (0, 0, 1), intensity: (1, 2, 3), beam_deg: 10, cutoff_deg: 60)";
+    let scene = ron(&format!(
+        "Scene(meshes: [\"room.obj\"], lights: [Directional(direction: (0, 0, 2), irradiance: 2), Point(position: (0, 0, 0), intensity: 0),
+        {spot}, Point(position: (0, 0.5, 0), intensity: (3, 0, 0), motion: [(time: 0), (time: 1, position: (1, 0.5, 0), intensity: 2)])])"
+    ))
+    .unwrap();
+    let state = scene.sample(1.0);
+    let [sun, dark, spot, point] = state.lights[..] else { panic!("four lights") };
+    let kinds = [LightKind::Directional, LightKind::Point, LightKind::Spot, LightKind::Point];
+    assert_eq!(state.lights.iter().map(|light| light.kind).collect::<Vec<_>>(), kinds.map(|kind| kind as u32));
+    assert_eq!(state.light(), spot, "the first spot light, whatever comes before it");
+    assert_eq!(state.light_view().forward, spot.direction);
+    assert_eq!((point.position, point.strength), (Vec3::new(1.0, 0.5, 0.0), Vec3::splat(2.0)));
+    // W, summed over the colours: E·π·r² over the room's sphere, with room for rounding; I·Ω with Ω = π sr for the cone.
+    let radius = 3_f32.sqrt();
+    assert!(sun.radius > radius && sun.radius < 1.01 * radius);
+    assert!((sun.position + radius * sun.direction).length() < 0.01 * radius && sun.direction == Vec3::Z);
+    let pi = std::f32::consts::PI;
+    let powers = [6.0 * pi * sun.radius.powi(2), 0.0, 6.0 * pi, 6.0 * 4.0 * pi];
+    let total: f32 = powers.iter().sum();
+    for (light, power) in [sun, dark, spot, point].iter().zip(powers) {
+        assert!((light.share - power / total).abs() < 1e-6, "{light:?}");
+        assert!((light.ray_density - light.strength.element_sum() / total).abs() < 1e-6, "{light:?}");
+    }
+}
+
+#[test]
+fn dark_and_extreme_lights_have_finite_shares() {
+    for lights in [
+        "Point(position: (0, 0, 0), intensity: 0), Directional(direction: (0, 1, 0), irradiance: 0)",
+        "Spot(position: (0, 0, 0), target: (0, 0, 1), intensity: 1, beam_deg: 0, cutoff_deg: 1e-40)",
+        "Directional(direction: (0, 1, 0), irradiance: 1e15), Point(position: (1e15, 0, 0), intensity: 1e-30)",
+    ] {
+        for mesh in ["\"room.obj\"", "Mesh(file: \"room.obj\", motion: [(time: 0, scale: 0)])"] {
+            let state = ron(&format!("Scene(meshes: [{mesh}], lights: [{lights}])")).unwrap().sample(0.0);
+            assert!(state.lights.iter().all(|light| light.share.is_finite() && light.ray_density.is_finite()), "{:?}", state.lights);
+            assert_eq!(state.light().strength.x > 0.0, lights.starts_with("Spot"), "a scene without spot lights has a dark one");
+        }
+    }
 }
 
 #[test]
@@ -105,7 +148,7 @@ fn fitted_camera_and_light_see_and_light_the_scene() {
     }
     let light = state.light();
     let distance = light.position.distance(state.bounds.centre().as_vec3());
-    assert!((light.intensity.x / distance.powi(2) - std::f32::consts::PI).abs() < 1e-4);
+    assert!((light.strength.x / distance.powi(2) - std::f32::consts::PI).abs() < 1e-4);
     assert!(state.bounds.distance(light.position.as_dvec3()) == 0.0 && light.position.y > 0.5);
     assert!(light.direction.dot(-light.position.normalize()) > 0.999);
 }
@@ -123,7 +166,7 @@ fn no_lights_is_dark() {
     let scene = ron("Scene(meshes: [\"tri.obj\"], lights: [])").unwrap();
     crate::memory::assert_says(&scene.warnings, "", &["black"]);
     let state = scene.sample(0.0);
-    assert_eq!(state.light().intensity, Vec3::ZERO);
+    assert_eq!(state.light().strength, Vec3::ZERO);
     assert!(state.light_view().clip_from_world.is_finite());
     assert_eq!(state.info.light_count, 0);
 }

@@ -13,7 +13,7 @@ use manylight::{
     },
     library, plan_input,
     renderer::{RenderError, Renderer},
-    scene::Scene,
+    scene::{LightShape, Scene},
 };
 
 use crate::cli::{Cli, DebugArgs, FrameArgs, PipelineArgs};
@@ -94,12 +94,23 @@ pub fn of_render(error: RenderError) -> Fault {
     }
 }
 
-/// Pipelines read the first spot light only: says how many are not rendered.
+/// Says which lights are not rendered by a pipeline that reads the first spot light only.
 fn warn_of_lights(scene: &Scene, plan: &Plan) {
-    let dark = scene.lights.len().saturating_sub(1);
-    if dark > 0 && plan.resource("scene_light").is_some() {
-        let message =
-            format!("the scene has {} lights, but this pipeline renders only the first; not rendered: {dark}", scene.lights.len());
-        super::warn(&Diagnostics(vec![Diagnostic { severity: Severity::Warning, ..Diagnostic::error_nowhere(message) }]));
+    if plan.resource("scene_light").is_none() || plan.resource("scene_lights").is_some() {
+        return;
+    }
+    let count = |of: fn(&LightShape) -> bool| scene.lights.iter().filter(|light| of(&light.shape)).count();
+    let spots = count(|shape| matches!(shape, LightShape::Spot { .. }));
+    let dark = [
+        (spots.saturating_sub(1), "spot"),
+        (count(|shape| *shape == LightShape::Point), "point"),
+        (count(|shape| *shape == LightShape::Directional), "directional"),
+    ];
+    let dark: Vec<String> = dark.iter().filter(|(count, _)| *count > 0).map(|(count, kind)| format!("{count} {kind}")).collect();
+    if !dark.is_empty() {
+        let rendered = if spots > 0 { "the first spot light" } else { "a spot light, which the scene does not have" };
+        let message = format!("this pipeline renders only {rendered}; lights not rendered: {}", dark.join(", "));
+        let warning = Diagnostic { severity: Severity::Warning, ..Diagnostic::error_nowhere(message) };
+        super::warn(&Diagnostics(vec![warning.help("the pipeline `reference` renders all lights")]));
     }
 }

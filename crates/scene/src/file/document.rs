@@ -7,12 +7,12 @@ use manylight_graph::{
 };
 
 use super::{
+    light::read_light,
     motion::{read_motion, warn_long_turns},
-    values::{albedo, angle, checked, intensity, point, rotation, scale, vector},
+    values::{albedo, checked, point, rotation, scale, vector},
 };
 use crate::{
-    gpu_data::Falloff,
-    motion::{CameraPose, LightPose, Pose, Track},
+    motion::{CameraPose, Pose, Track},
     scene::Light,
 };
 
@@ -48,12 +48,6 @@ const TRANSFORM_KEY: Shape = Shape { what: "a key frame of an object", required:
 const CAMERA: Shape = Shape { what: "a camera", required: &["origin", "target"], optional: &["up", "fov_x_deg", "motion", "repeat"] };
 const CAMERA_KEY: Shape =
     Shape { what: "a key frame of a camera", required: &["time"], optional: &["origin", "target", "up", "fov_x_deg"] };
-const SPOT: Shape = Shape {
-    what: "a spot light",
-    required: &["position", "target", "intensity", "beam_deg", "cutoff_deg"],
-    optional: &["falloff", "motion", "repeat"],
-};
-const LIGHT_KEY: Shape = Shape { what: "a key frame of a light", required: &["time"], optional: &["position", "target", "intensity"] };
 const MATERIAL: Shape = Shape { what: "a material", required: &[], optional: &["diffuse", "specular", "shininess", "texture"] };
 
 /// Field of view of a camera that does not say.
@@ -62,7 +56,7 @@ const DEFAULT_FOV_X_DEG: f32 = 50.0;
 /// Reads a document; faults go to the reader.
 pub(super) fn read(reader: &mut Reader, tree: &Tree) -> Document {
     let mut document = Document::default();
-    if !named(reader, tree, "Scene", "a scene file is `Scene(meshes: [\"mesh.obj\"], …)`") {
+    if named(reader, tree, &["Scene"], "a scene file is `Scene(meshes: [\"mesh.obj\"], …)`").is_none() {
         return document;
     }
     let Some(fields) = reader.record(tree, &SCENE) else { return document };
@@ -83,30 +77,26 @@ pub(super) fn read(reader: &mut Reader, tree: &Tree) -> Document {
     document
 }
 
-/// Whether a value is of the form `NAME(…)`; if not, that is reported.
-fn named(reader: &mut Reader, tree: &Tree, wanted: &str, help: &str) -> bool {
-    match &tree.kind {
-        Kind::Record(Some(name), _) | Kind::Tuple(Some(name), _) if name.text != wanted => {
-            let known = suggest(&name.text, [wanted]);
-            let help = if known.is_empty() { help.to_owned() } else { known };
-            reader.error(&name.range, format!("expected `{wanted}(…)`, found `{}(…)`", name.text), help);
-            false
-        }
-        Kind::Record(Some(_), _) | Kind::Tuple(Some(_), _) => true,
-        _ => {
-            reader.expected(tree, &format!("`{wanted}(…)`"), help);
-            false
-        }
+/// Which of the wanted names a value of the form `NAME(…)` has; if none, that is reported.
+pub(super) fn named(reader: &mut Reader, tree: &Tree, wanted: &[&'static str], help: &str) -> Option<&'static str> {
+    let forms = wanted.iter().map(|name| format!("`{name}(…)`")).collect::<Vec<_>>().join(" or ");
+    let (Kind::Record(Some(name), _) | Kind::Tuple(Some(name), _)) = &tree.kind else {
+        reader.expected(tree, &forms, help);
+        return None;
+    };
+    let found = wanted.iter().find(|known| **known == name.text);
+    if found.is_none() {
+        let known = suggest(&name.text, wanted.iter().copied());
+        reader.error(&name.range, format!("expected {forms}, found `{}(…)`", name.text), known);
     }
+    found.copied()
 }
 
 fn read_mesh(reader: &mut Reader, tree: &Tree) -> Option<MeshEntry> {
     if let Kind::Text(_) = tree.kind {
         return reader.text(tree, "a file").map(|file| MeshEntry { file, name: None, pose: Track::fixed(Pose::default()) });
     }
-    if !named(reader, tree, "Mesh", "a mesh is \"mesh.obj\" or `Mesh(file: \"mesh.obj\", …)`") {
-        return None;
-    }
+    named(reader, tree, &["Mesh"], "a mesh is \"mesh.obj\" or `Mesh(file: \"mesh.obj\", …)`")?;
     let fields = reader.record(tree, &MESH)?;
     let name = fields.get("name").and_then(|tree| reader.text(tree, "a name")).map(|name| name.text);
     let mut rest = Pose::default();
@@ -148,7 +138,6 @@ fn read_pose(reader: &mut Reader, tree: &Tree, shape: &Shape, rest: &Pose) -> Op
 
 fn read_camera(reader: &mut Reader, tree: &Tree) -> Option<Track<CameraPose>> {
     let fields = reader.record(tree, &CAMERA)?;
-    let before = reader.out.len();
     let none = CameraPose { origin: Vec3::ZERO, target: Vec3::NEG_Z, up: Vec3::Y, fov_x_deg: DEFAULT_FOV_X_DEG };
     let complete = fields.get("origin").is_some() && fields.get("target").is_some();
     let rest = read_camera_pose(reader, tree, &fields, &none, complete);
@@ -156,8 +145,7 @@ fn read_camera(reader: &mut Reader, tree: &Tree) -> Option<Track<CameraPose>> {
         let fields = reader.record(tree, &CAMERA_KEY)?;
         Some(read_camera_pose(reader, tree, &fields, &rest, complete))
     });
-    // A camera with faults is none that could be used; the faults stop the scene.
-    (reader.out.len() == before).then(|| motion.and_then(|keys| keys.track(|pose| pose)).unwrap_or_else(|| Track::fixed(rest)))
+    Some(motion.and_then(|keys| keys.track(|pose| pose)).unwrap_or_else(|| Track::fixed(rest)))
 }
 
 /// The camera of a record; what is missing is taken from `rest`.
@@ -181,66 +169,6 @@ fn read_camera_pose(reader: &mut Reader, tree: &Tree, fields: &Fields<'_>, rest:
         }
     }
     CameraPose { origin, target, up, fov_x_deg: fov.unwrap_or(rest.fov_x_deg) }
-}
-
-fn read_light(reader: &mut Reader, tree: &Tree) -> Option<Light> {
-    if !named(reader, tree, "Spot", "a light is `Spot(position: …, target: …, intensity: …, beam_deg: …, cutoff_deg: …)`") {
-        return None;
-    }
-    let fields = reader.record(tree, &SPOT)?;
-    let before = reader.out.len();
-    let complete = fields.get("position").is_some() && fields.get("target").is_some();
-    let none = LightPose { position: Vec3::ZERO, target: Vec3::NEG_Y, intensity: Vec3::ZERO };
-    let rest = read_light_pose(reader, tree, &fields, &none, complete);
-    let beam = fields.get("beam_deg").and_then(|tree| angle(reader, tree));
-    let cutoff = fields.get("cutoff_deg").and_then(|tree| angle(reader, tree).map(|angle| (angle, tree)));
-    if let (Some(beam), Some((cutoff, tree))) = (beam, cutoff)
-        && cutoff <= beam
-    {
-        reader.error(
-            &tree.range,
-            format!("the cut-off {cutoff}° is not above the beam {beam}°"),
-            "both are half-angles; the light fades between them",
-        );
-    }
-    let falloff = fields.get("falloff").map_or(Some(Falloff::Linear), |tree| read_falloff(reader, tree));
-    let motion = read_motion(reader, &fields, |reader, tree| {
-        let fields = reader.record(tree, &LIGHT_KEY)?;
-        Some(read_light_pose(reader, tree, &fields, &rest, complete))
-    });
-    let pose = motion.and_then(|keys| keys.track(|pose| pose)).unwrap_or_else(|| Track::fixed(rest));
-    (reader.out.len() == before).then_some(())?;
-    Some(Light { pose, beam_deg: beam?, cutoff_deg: cutoff?.0, falloff: falloff? })
-}
-
-/// The light of a record; what is missing is taken from `rest`.
-fn read_light_pose(reader: &mut Reader, tree: &Tree, fields: &Fields<'_>, rest: &LightPose, complete: bool) -> LightPose {
-    let before = reader.out.len();
-    let position = fields.get("position").and_then(|tree| point(reader, tree)).unwrap_or(rest.position);
-    let target = fields.get("target").and_then(|tree| point(reader, tree)).unwrap_or(rest.target);
-    let intensity = fields.get("intensity").and_then(|tree| intensity(reader, tree)).unwrap_or(rest.intensity);
-    if reader.out.len() == before && complete && position == target {
-        reader.error(&head(tree), "the light is on its target", "position and target must differ: they give its direction");
-    }
-    LightPose { position, target, intensity }
-}
-
-fn read_falloff(reader: &mut Reader, tree: &Tree) -> Option<Falloff> {
-    let known = [("linear", Falloff::Linear), ("cosine", Falloff::Cosine), ("smooth", Falloff::Smooth)];
-    let names = known.map(|(name, _)| name);
-    match &tree.kind {
-        Kind::Name(name) | Kind::Text(name) => {
-            let found = known.iter().find(|(known, _)| known == name).map(|(_, falloff)| *falloff);
-            if found.is_none() {
-                reader.error(&tree.range, format!("unknown falloff `{name}`"), suggest(name, names));
-            }
-            found
-        }
-        _ => {
-            reader.expected(tree, "`linear`, `cosine` or `smooth`", "");
-            None
-        }
-    }
 }
 
 fn read_material(reader: &mut Reader, name: Spanned, tree: &Tree) -> Option<MaterialEntry> {

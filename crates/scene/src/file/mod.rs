@@ -1,6 +1,7 @@
 //! Scene files.
 
 mod document;
+mod light;
 mod motion;
 mod values;
 
@@ -171,7 +172,7 @@ impl Loader<'_> {
             let light = fit::light(&bounds);
             let pose = light.pose.at(0.0);
             let message =
-                format!("the scene has no light: a spot of {:.4} W/sr shines from {} to {}", pose.intensity.x, pose.position, pose.target);
+                format!("the scene has no light: a spot of {:.4} W/sr shines from {} to {}", pose.strength.x, pose.position, pose.target);
             self.out
                 .0
                 .push(nowhere(message).help("write `lights: [Spot(position: …, target: …, intensity: …, beam_deg: …, cutoff_deg: …)]`"));

@@ -8,7 +8,7 @@ use manylight_graph::{
 };
 
 use super::{document::WrittenPose, values::LARGEST};
-use crate::motion::{Interpolate, Repeat, Track};
+use crate::motion::{Interpolate, LightPose, Repeat, Track};
 
 /// Key frames as written.
 pub(super) struct Keys<T> {
@@ -97,6 +97,18 @@ pub(super) fn warn_long_turns(reader: &mut Reader, keys: &Keys<WrittenPose>) {
             let message = format!("from {angle}° to {next_angle}° is half a turn or more, and goes the short way round");
             let span = reader.span(place);
             reader.out.push(Diagnostic::warning(message, span).help("put key frames less than 180° apart"));
+        }
+    }
+}
+
+/// Warns where a directional light turns round from one key to the next: the light of a sun that rises and sets without a key at noon.
+pub(super) fn warn_opposite_directions(reader: &mut Reader, keys: &Keys<LightPose>) {
+    for pair in keys.keys.windows(2) {
+        let [(_, pose, _), (_, next, place)] = pair else { continue };
+        if pose.target.dot(next.target) < -SAME_AXIS {
+            let message = format!("from {} to {} is half a turn: the direction jumps in the middle", pose.target, next.target);
+            let span = reader.span(place);
+            reader.out.push(Diagnostic::warning(message, span).help("put a key frame between them, on the side where it shall pass"));
         }
     }
 }

@@ -68,8 +68,8 @@ pub(super) fn scale(reader: &mut Reader, tree: &Tree) -> Option<Vec3> {
     one_or_three(reader, tree, |_| None)
 }
 
-/// W/sr: grey or RGB.
-pub(super) fn intensity(reader: &mut Reader, tree: &Tree) -> Option<Vec3> {
+/// Intensity or irradiance: grey or RGB.
+pub(super) fn strength(reader: &mut Reader, tree: &Tree) -> Option<Vec3> {
     one_or_three(reader, tree, |value| (value < 0.0).then_some("light is not negative"))
 }
 
