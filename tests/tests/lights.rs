@@ -114,7 +114,8 @@ fn direct_light_on_a_floor_has_its_closed_form() {
     let of_directional = |_| albedo / PI * irradiance * 0.8;
     // A pixel is 1/16 wide: its mean differs from the value at its centre by less than 0.5 % at this height of the light, and its
     // 1024 paths have a standard error of less than 0.2 %. Parallel light is the same everywhere.
-    let cases: [(Light, &dyn Fn(DVec3) -> DVec3, f64); 2] =
+    type Radiance<'a> = &'a dyn Fn(DVec3) -> DVec3;
+    let cases: [(Light, Radiance<'_>, f64); 2] =
         [(Light::Point { position, intensity }, &of_point, 0.01), (Light::Directional { direction, irradiance }, &of_directional, 1e-5)];
     for (light, expected, tolerance) in cases {
         let twin = floor(light);
@@ -155,12 +156,12 @@ fn light_of_several_lights_is_the_sum_of_their_light() {
     ];
     let mesh = root().join("assets/cornell.obj");
     let scene = corner(&[]).write(&folder);
-    let mut renderer = job(&scene, "full").renderer();
+    let mut renderer = job(&scene, "full").set("paths", 8).renderer();
     let mut render = |lights: &[&str]| {
         let camera = "(origin: (2.78, 2.73, -8.0), target: (2.78, 2.73, 0.0), fov_x_deg: 39.3077)";
         let text = format!("Scene(meshes: [{:?}], camera: {camera}, lights: [{}])", mesh.to_string_lossy(), lights.join(", "));
         fs::write(&scene, text).expect("written");
-        again(&mut renderer, &scene, 64);
+        again(&mut renderer, &scene, 32);
         blocks_of(&renderer)
     };
     let single = lights.map(|light| render(&[light]));

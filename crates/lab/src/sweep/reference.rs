@@ -20,8 +20,8 @@ use crate::{
 
 /// Its paths must not be those of a variant that traces paths as well.
 const SEED: u32 = 0x7265_6665;
-/// Frames are independent batches, whose spread gives the standard error: so many, if there are as many paths.
-const BATCHES: u32 = 64;
+/// Frames are independent batches, whose spread gives the standard error. Few of many paths: those of one frame are spread evenly over the pixel.
+const BATCHES: u32 = 8;
 /// Most paths a pixel and frame that the pipeline takes.
 const MOST_PATHS_A_FRAME: u32 = 256;
 
