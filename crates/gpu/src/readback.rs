@@ -1,6 +1,6 @@
 //! Resources of a frame on the host: textures as floats, buffers as bytes or JSON. These functions wait for the GPU.
 
-use std::{collections::BTreeMap, sync::mpsc};
+use std::{collections::BTreeMap, sync::mpsc, time::Duration};
 
 use manylight_graph::{
     plan::{Plan, Target},
@@ -17,6 +17,9 @@ use crate::{
     frame::Frame,
     pool::Memory,
 };
+
+/// No thread takes longer to tell another that its buffer is mapped, unless the device is lost.
+const TELLING: Duration = Duration::from_secs(10);
 
 /// A picture of 32-bit floats, rows from top to bottom, channels interleaved.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -197,7 +200,8 @@ fn fetch(gpu: &Gpu, name: &str, size: u64, copy: impl FnOnce(&mut wgpu::CommandE
         let _ = tell.send(result);
     });
     gpu.wait();
-    match told.try_recv() {
+    // The work is done; where several threads wait on one device, another may still be on its way to tell.
+    match told.recv_timeout(TELLING) {
         Ok(Ok(())) => {}
         _ => {
             let reason = gpu.lost().unwrap_or_else(|| "the buffer could not be mapped".to_owned());
