@@ -160,6 +160,34 @@ fn faults_of_sweeps_are_told_at_their_place() {
     assert!(!Path::new(&out).exists(), "nothing was run, nothing may be written");
 }
 
+/// A sequence is compared with a reference of each time, and its light goes where the sweep says.
+#[test]
+fn sequences_follow_the_path_of_the_light() {
+    let path_of_light = "light_path: [(time: 0.0, position: (2.0, 3.9, 1.2), target: (5.4, 4.9, 5.3)), (time: 1.0, position: (3.5, 3.9, 1.2), target: (0.2, 1.0, 5.3))]";
+    let still = r#"Sweep(
+        doc: "?", variants: {"a": (pipeline: "acrsm", set: {"visibility": "none", "rsm_size": 64, "clusters": 16, "tiles": 1})},
+        scenes: ["cornell"], sizes: [(16, 16)], frames: 2, measure: 1, fps: 4.0, reference: (paths: 16),
+        sequence: (frames: 4, every: 2),
+    )"#;
+    let run = |text: &str| {
+        let (folder, file) = with_sweep(text);
+        manylight(&["sweep", &file, "--out", &path(folder.path(), "out"), "--cache", &path(folder.path(), "cache")]).expect(0);
+        record::read(&folder.path().join("out/records.jsonl")).expect("readable").0.remove(0)
+    };
+    let moving = still.replace("sequence:", &format!("{path_of_light}, sequence:"));
+    let (still, moving) = (run(still), run(&moving));
+    assert_ne!(still.scene.hash, moving.scene.hash);
+    for record in [&still, &moving] {
+        assert_eq!(record.sequence.iter().map(|frame| frame.time).collect::<Vec<_>>(), [0.5, 1.0]);
+        // Compared with the right time, the error is that of the method: with a wrong one, light would be on another wall.
+        for frame in &record.sequence {
+            let error = frame.metrics["relative_mean_absolute_error"];
+            assert!(error < 0.5, "{error} at {} s", frame.time);
+        }
+    }
+    assert!(moving.metrics["flicker"] > still.metrics["flicker"]);
+}
+
 #[test]
 fn references_on_disk_must_fit() {
     let (folder, file) = with_sweep(SWEEP);

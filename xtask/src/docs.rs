@@ -1,4 +1,5 @@
-//! The node reference: one page a node, generated from the declarations by `manylight nodes --format markdown`; and the book.
+//! What of the book is generated: one page a node, from the declarations by `manylight nodes --format markdown`; one page a sweep, from the records
+//! in docs/records by `manylight sweep --report --markdown`.
 
 use std::{
     collections::BTreeMap,
@@ -12,6 +13,8 @@ use crate::{
 };
 
 const PAGES: &str = "docs/src/nodes";
+const RECORDS: &str = "docs/records";
+const RESULTS: &str = "docs/src/results/sweeps";
 const SUMMARY: &str = "docs/src/SUMMARY.md";
 const INDEX_LINE: &str = "(nodes/index.md)";
 
@@ -79,7 +82,46 @@ fn reference(shell: &Shell, program: &str) -> Result<BTreeMap<PathBuf, String>, 
         nodes.iter().map(|(name, text)| (Path::new(PAGES).join(format!("{name}.md")), text.clone())).collect();
     files.insert(Path::new(PAGES).join("index.md"), index(&nodes));
     files.insert(PathBuf::from(SUMMARY), summary);
+    files.extend(results(shell, program)?);
     Ok(files)
+}
+
+/// The pages of the sweeps whose records are in the repository, with their figures.
+fn results(shell: &Shell, program: &str) -> Result<BTreeMap<PathBuf, String>, Stop> {
+    let failed = |path: &Path, e: std::io::Error| Stop::failed(format!("{}: {e}", path.display()));
+    let pages = shell.root.join("target/docs/pages");
+    let _ = std::fs::remove_dir_all(shell.root.join("target/docs"));
+    let mut files = BTreeMap::new();
+    for name in names(&shell.root.join(RECORDS))? {
+        // The command writes beside the records: into a copy of them.
+        let copy = shell.root.join("target/docs").join(&name);
+        let records = shell.root.join(RECORDS).join(&name).join("records.jsonl");
+        std::fs::create_dir_all(&copy)
+            .and_then(|()| std::fs::copy(&records, copy.join("records.jsonl")))
+            .map_err(|e| failed(&records, e))?;
+        let (out, folder) = (copy.to_string_lossy().into_owned(), pages.to_string_lossy().into_owned());
+        let words = [program, "sweep", &name, "--out", &out, "--report", "--markdown", &folder];
+        let output = shell.quiet(&words).ok_or_else(|| Stop::failed(format!("{program} could not start")))?;
+        if !output.success {
+            return Err(Stop::failed(format!("`manylight sweep {name} --report` failed:\n{}", output.stderr.trim())));
+        }
+    }
+    for name in names(&pages)? {
+        let text = std::fs::read_to_string(pages.join(&name)).map_err(|e| failed(&pages.join(&name), e))?;
+        files.insert(Path::new(RESULTS).join(name), text);
+    }
+    Ok(files)
+}
+
+/// Names of what is in a folder, sorted; none if it is not there.
+fn names(folder: &Path) -> Result<Vec<String>, Stop> {
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let entries = std::fs::read_dir(folder).map_err(|e| Stop::failed(format!("{}: {e}", folder.display())))?;
+    let mut names: Vec<String> = entries.filter_map(|entry| Some(entry.ok()?.file_name().to_string_lossy().into_owned())).collect();
+    names.sort();
+    Ok(names)
 }
 
 /// Paths whose text differs from what is wanted, and generated pages that nobody wants any more.
@@ -89,7 +131,10 @@ fn stale(shell: &Shell, wanted: &BTreeMap<PathBuf, String>) -> Result<Vec<PathBu
         .filter(|(p, text)| std::fs::read_to_string(shell.root.join(p)).ok().as_ref() != Some(*text))
         .map(|(p, _)| p.clone())
         .collect();
-    let existing = links::markdown_files(&shell.root.join(PAGES)).map_err(|e| Stop::failed(format!("{PAGES}: {e}")))?;
+    let mut existing = Vec::new();
+    for folder in [PAGES, RESULTS] {
+        existing.extend(links::markdown_files(&shell.root.join(folder)).map_err(|e| Stop::failed(format!("{folder}: {e}")))?);
+    }
     let existing = existing.iter().filter_map(|p| p.strip_prefix(&shell.root).ok()).map(Path::to_path_buf);
     paths.extend(existing.filter(|p| !wanted.contains_key(p)));
     Ok(paths)

@@ -5,6 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use glam::Vec3;
 use manylight_graph::diagnostics::Diagnostics;
 
 use crate::{
@@ -13,7 +14,7 @@ use crate::{
     files::{Disk, FileReader},
     gpu_data::{self, Falloff},
     import::{Material, Mesh, Textures},
-    motion::{CameraPose, LightPose, Pose, Track},
+    motion::{CameraPose, LightPose, Pose, Repeat, Track},
 };
 
 /// A mesh somewhere in the scene.
@@ -107,10 +108,10 @@ impl Scene {
 
     /// What the scene has, for conditions in pipelines.
     pub fn features(&self) -> BTreeMap<String, bool> {
-        let normals = self.meshes.iter().flat_map(|mesh| &mesh.vertices).any(|vertex| vertex.normal != glam::Vec3::ZERO);
+        let normals = self.meshes.iter().flat_map(|mesh| &mesh.vertices).any(|vertex| vertex.normal != Vec3::ZERO);
         let features = [
             ("textures", self.textures.count > 0),
-            ("glossy", self.materials.iter().any(|material| material.specular != glam::Vec3::ZERO)),
+            ("glossy", self.materials.iter().any(|material| material.specular != Vec3::ZERO)),
             ("moving_objects", self.objects.iter().any(|object| object.pose.moves())),
             ("moving_lights", self.lights.iter().any(|light| light.pose.moves())),
             ("moving_camera", self.camera.moves()),
@@ -118,6 +119,27 @@ impl Scene {
             ("normals", normals),
         ];
         features.into_iter().map(|(name, on)| (name.to_owned(), on)).collect()
+    }
+
+    /// Moves the first light along a path instead of as its file says: times in seconds, positions and targets in world space. Its strength
+    /// is the one it has at the first time. The hash becomes another.
+    ///
+    /// # Errors
+    /// Why there is no such path, in words.
+    pub fn move_light(&mut self, path: &[(f64, Vec3, Vec3)]) -> Result<(), &'static str> {
+        let light = self.lights.first_mut().ok_or("the scene has no light")?;
+        let first = path.first().ok_or("the path has no point")?;
+        let strength = light.pose.at(first.0).strength;
+        let keys = path.iter().map(|&(time, position, target)| (time, LightPose { position, target, strength })).collect();
+        light.pose = Track::keyed(keys, Repeat::Clamp).ok_or("times of the path must be finite and increasing")?;
+        for (time, position, target) in path {
+            let numbers =
+                [time.to_bits()].into_iter().chain([position, target].into_iter().flat_map(|v| v.to_array()).map(|v| v.to_bits().into()));
+            for number in numbers {
+                self.hash = (self.hash ^ number).wrapping_mul(0x0100_0000_01b3);
+            }
+        }
+        Ok(())
     }
 
     /// Number of triangles of all objects.

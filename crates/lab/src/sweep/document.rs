@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
 use indexmap::IndexMap;
 use manylight_graph::{
     Spanned,
@@ -44,6 +45,8 @@ pub struct Sweep {
     pub time: f64,
     /// Frames a second of scene time; without it time stands still.
     pub fps: Option<f64>,
+    /// Times, positions and targets of the first light, instead of the scene's own; empty: as the scene says.
+    pub light_path: Vec<(f64, Vec3, Vec3)>,
     /// Error over time.
     pub sequence: Option<Sequence>,
     /// The resource that is compared.
@@ -270,6 +273,7 @@ fn read_sweep(reader: &mut Reader, tree: &Tree, small: bool) -> Option<Sweep> {
         measure: chosen.measure.or(full.measure).unwrap_or(16),
         time: number(reader, "time").unwrap_or(0.0),
         fps,
+        light_path: fields.get("light_path").map(|tree| extras::light_path(reader, tree)).unwrap_or_default(),
         sequence: chosen.sequence.or(full.sequence),
         image: text(reader, "image").unwrap_or(image),
         reference: PathTraced { component: component_read.unwrap_or(component), paths: chosen.paths.or(paths).unwrap_or(1024) },

@@ -1,11 +1,48 @@
-//! What a sweep's document gives to its report: tables of papers, curves of other renderers.
+//! Parts of a sweep's document that stand for themselves: the path of the light; what goes to the report, tables of papers and curves of other renderers.
 
+use glam::Vec3;
 use manylight_graph::ron::{Kind, Reader, Shape, Tree, suggest};
 
 use crate::sheet::{Axis, Curve, Paper};
 
 const PAPER: Shape = Shape { what: "a paper's table", required: &["source", "unit", "rows"], optional: &[] };
 const CURVE: Shape = Shape { what: "a curve", required: &["name", "scene", "metric", "points"], optional: &[] };
+
+const LIGHT_KEY: Shape = Shape { what: "a place of the light", required: &["time", "position", "target"], optional: &[] };
+
+/// Times, positions and targets; times increase.
+pub(super) fn light_path(reader: &mut Reader, tree: &Tree) -> Vec<(f64, Vec3, Vec3)> {
+    let mut path: Vec<(f64, Vec3, Vec3)> = Vec::new();
+    for tree in reader.list(tree, "places") {
+        let Some(fields) = reader.record(tree, &LIGHT_KEY) else { continue };
+        let vector = |reader: &mut Reader, name: &str| fields.get(name).and_then(|tree| vector(reader, tree));
+        let (position, target) = (vector(reader, "position"), vector(reader, "target"));
+        let time = fields.get("time").and_then(|tree| {
+            let time = reader.float(tree, "seconds")?;
+            if path.last().is_some_and(|last| last.0 >= time) {
+                reader.error(&tree.range, "times must increase", "bring the places into the order of their times");
+            }
+            Some(time)
+        });
+        if let (Some(time), Some(position), Some(target)) = (time, position, target) {
+            path.push((time, position, target));
+        }
+    }
+    path
+}
+
+fn vector(reader: &mut Reader, tree: &Tree) -> Option<Vec3> {
+    match &tree.kind {
+        Kind::Tuple(None, items) if items.len() == 3 => {
+            let [x, y, z] = [0, 1, 2].map(|i| reader.float(&items[i], "a coordinate"));
+            Some(Vec3::new(x? as f32, y? as f32, z? as f32))
+        }
+        _ => {
+            reader.expected(tree, "a vector", "write (x, y, z)");
+            None
+        }
+    }
+}
 
 pub(super) fn papers(reader: &mut Reader, tree: &Tree) -> Vec<Paper> {
     reader.list(tree, "tables").iter().filter_map(|tree| paper(reader, tree)).collect()

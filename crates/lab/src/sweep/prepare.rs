@@ -55,7 +55,14 @@ pub fn prepare(sweep: Sweep, library: &Library, find: &SceneFinder<'_>) -> Resul
         let path = |name: &Spanned| sweep.beside(&name.text);
         let files = entry.reference.as_ref().map(|reference| (path(reference), entry.standard_error.as_ref().map(path)));
         match source.load() {
-            Ok(scene) => scenes.push(LoadedScene { source, scene, files }),
+            Ok(mut scene) => {
+                if !sweep.light_path.is_empty()
+                    && let Err(why) = scene.move_light(&sweep.light_path)
+                {
+                    out.push(Diagnostic::error(format!("the light cannot be moved: {why}"), entry.scene.span.clone()));
+                }
+                scenes.push(LoadedScene { source, scene, files });
+            }
             Err(faults) => out.extend(faults),
         }
     }

@@ -54,6 +54,9 @@ pub struct SweepArgs {
     /// Make table and report from the records in DIR, whatever machine they are of, and run nothing; needs no GPU
     #[arg(long)]
     pub report: bool,
+    /// Also write the report as Markdown with its figures into this folder
+    #[arg(long, value_name = "DIR", conflicts_with = "list")]
+    pub markdown: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub lab: LabArgs,

@@ -1,13 +1,20 @@
 //! `manylight sweep`: many runs, their records and their report.
 
+use std::{fs, path::PathBuf};
+
 use manylight::{
     fault::Fault,
+    files::{FileError, write_text},
     graph::{
         Spanned,
         diagnostics::{Severity, Span},
         library::Library,
     },
-    lab::sweep::{Event, Outcome, SceneUse, Sweep, collect},
+    lab::{
+        record::Record,
+        report,
+        sweep::{Event, Outcome, SceneUse, Sweep, collect},
+    },
     library,
 };
 
@@ -19,7 +26,7 @@ pub fn run(cli: &Cli, args: &SweepArgs) -> Result<(), Fault> {
     let library = library::open(cli.root.as_deref())?;
     let sweep = read(&library, args)?;
     if args.report {
-        return report(&library, &sweep, args);
+        return report_only(&library, &sweep, args);
     }
     let prepared = lab::load(sweep, &library)?;
     if args.list {
@@ -27,7 +34,7 @@ pub fn run(cli: &Cli, args: &SweepArgs) -> Result<(), Fault> {
         return super::print(&lines);
     }
     let Outcome { records, kept, failed, missing } = lab::run(&prepared, &args.out, args.shard, &args.lab)?;
-    let report = lab::write_report(&prepared.sweep, &records, &args.out)?;
+    let report = write(&prepared.sweep, &records, args)?;
     let total = prepared.runs.len();
     super::print(&format!("{} of {total} runs have records ({kept} were there already): {}\n", records.len(), report.display()))?;
     match (failed, missing) {
@@ -51,7 +58,7 @@ fn read(library: &Library, args: &SweepArgs) -> Result<Sweep, Fault> {
     for scene in &args.scene {
         // Told here if it is not there: the sweep's document is not at fault.
         library::scene(library, scene)?;
-        let path = |file: &std::path::PathBuf| given(file.to_string_lossy().into_owned());
+        let path = |file: &PathBuf| given(file.to_string_lossy().into_owned());
         let (reference, standard_error) = (args.reference.as_ref().map(path), args.standard_error.as_ref().map(path));
         scenes.push(SceneUse { scene: given(scene.clone()), reference, standard_error });
     }
@@ -65,7 +72,7 @@ fn read(library: &Library, args: &SweepArgs) -> Result<Sweep, Fault> {
 }
 
 /// Table and report of the records that are there.
-fn report(library: &Library, sweep: &Sweep, args: &SweepArgs) -> Result<(), Fault> {
+fn report_only(library: &Library, sweep: &Sweep, args: &SweepArgs) -> Result<(), Fault> {
     let (registry, _) = manylight::load_registry(library);
     let faults = sweep.check(library, &registry, &|scene| library::scene(library, scene).map_err(|fault| fault.to_string()));
     if faults.0.iter().any(|fault| fault.severity == Severity::Error) {
@@ -78,6 +85,19 @@ fn report(library: &Library, sweep: &Sweep, args: &SweepArgs) -> Result<(), Faul
         }
     })
     .map_err(of_file)?;
-    let file = lab::write_report(sweep, &records, &args.out)?;
+    let file = write(sweep, &records, args)?;
     super::print(&format!("{} of {} runs have records: {}\n", records.len(), runs.len(), file.display()))
+}
+
+/// Writes the report, and the page of a book where that is asked for.
+fn write(sweep: &Sweep, records: &[Record], args: &SweepArgs) -> Result<PathBuf, Fault> {
+    if let Some(folder) = &args.markdown {
+        let page = report::markdown(&lab::sheet(sweep), records);
+        fs::create_dir_all(folder).map_err(|e| of_file(FileError::write(folder, &e)))?;
+        let text = (format!("{}.md", sweep.name), page.text);
+        for (name, text) in page.figures.iter().chain([&text]) {
+            write_text(&folder.join(name), text).map_err(of_file)?;
+        }
+    }
+    lab::write_report(sweep, records, &args.out)
 }
