@@ -175,7 +175,7 @@ const SWEEP: Shape = Shape {
 const SMALL: Shape = Shape {
     what: "the small size",
     required: &[],
-    optional: &["vary", "scenes", "sizes", "seeds", "frames", "measure", "sequence", "paths"],
+    optional: &["scenes", "sizes", "seeds", "frames", "measure", "sequence", "paths"],
 };
 const VARIANT: Shape = Shape { what: "a variant", required: &["pipeline"], optional: &["set", "vary", "frames", "image"] };
 const SCENE: Shape = Shape { what: "a scene", required: &["scene"], optional: &["reference", "standard_error"] };
@@ -188,10 +188,12 @@ const LARGEST_SIDE: i64 = 16384;
 const MOST_FRAMES: i64 = 1_000_000;
 const MOST_PATHS: i64 = 1_000_000;
 
+/// Values that each knob has in the small size: its first ones.
+const SMALL_VALUES: usize = 2;
+
 /// What a sweep has in a full and in a small size.
 #[derive(Default)]
 struct Extent {
-    vary: Option<Vec<Zip>>,
     scenes: Option<Vec<SceneUse>>,
     sizes: Option<Vec<(u32, u32)>>,
     seeds: Option<Vec<u32>>,
@@ -260,12 +262,12 @@ fn read_sweep(reader: &mut Reader, tree: &Tree, small: bool) -> Option<Sweep> {
     });
     let chosen = lesser.filter(|_| small).unwrap_or_default();
     let (component_read, paths) = reference;
-    Some(Sweep {
+    let mut sweep = Sweep {
         name: stem(&reader.source.name),
         source: Arc::clone(&reader.source),
         doc: text(reader, "doc").map(|d| d.text).unwrap_or_default(),
         variants,
-        vary: chosen.vary.or(full.vary).unwrap_or_default(),
+        vary: fields.get("vary").map(|tree| read_vary(reader, tree)).unwrap_or_default(),
         scenes: chosen.scenes.or(full.scenes).unwrap_or_default(),
         sizes: chosen.sizes.or(full.sizes).unwrap_or_else(|| vec![(256, 256)]),
         seeds: chosen.seeds.or(full.seeds).unwrap_or_else(|| vec![0]),
@@ -283,7 +285,12 @@ fn read_sweep(reader: &mut Reader, tree: &Tree, small: bool) -> Option<Sweep> {
         mask: fields.get("mask").and_then(|tree| read_mask(reader, tree)),
         papers: fields.get("papers").map(|tree| extras::papers(reader, tree)).unwrap_or_default(),
         curves: fields.get("curves").map(|tree| extras::curves(reader, tree)).unwrap_or_default(),
-    })
+    };
+    if small {
+        let zips = sweep.variants.iter_mut().flat_map(|variant| &mut variant.vary).chain(&mut sweep.vary);
+        zips.flat_map(|zip| &mut zip.0).for_each(|knob| knob.values.truncate(SMALL_VALUES));
+    }
+    Some(sweep)
 }
 
 /// File stem of a source's name.
@@ -293,7 +300,6 @@ fn stem(name: &str) -> String {
 
 fn read_extent(reader: &mut Reader, fields: &Fields<'_>) -> Extent {
     Extent {
-        vary: fields.get("vary").map(|tree| read_vary(reader, tree)),
         scenes: fields.get("scenes").map(|tree| {
             let scenes: Vec<_> = reader.list(tree, "scenes").iter().filter_map(|tree| read_scene(reader, tree)).collect();
             not_empty(reader, tree, "scenes");
