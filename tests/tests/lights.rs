@@ -7,7 +7,7 @@ use manylight_gpu::Image;
 use manylight_passes::Renderer;
 
 use crate::{
-    path_tracer::{Block, blocks, compare},
+    blocks::{Block, blocks, compare},
     reference::rgb,
     renders::{Job, read},
     support::root,

@@ -1,6 +1,7 @@
 //! Tests that cross the crates: the command line, images against references, energy, determinism, reload.
 //! One binary, so that the workspace links once.
 
+mod blocks;
 mod cli;
 mod clustering;
 mod determinism;

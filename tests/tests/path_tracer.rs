@@ -2,11 +2,19 @@
 
 use std::path::PathBuf;
 
+use manylight::{
+    files::Picture,
+    metrics::{Estimate, ZTest, z_test},
+};
+
 use crate::{
-    reference::{exr, reference_rgb, rgb},
+    reference::exr,
     renders::{Job, read},
     support::{root, shared},
 };
+
+/// Paths a pixel and frame: so many are spread evenly over each pixel.
+const PATHS: i64 = 16;
 
 struct Case {
     scene: PathBuf,
@@ -24,65 +32,31 @@ const DIRECT: (&str, &str) = ("direct", "direct");
 const ONE_BOUNCE: (&str, &str) = ("one_bounce", "onebounce");
 const FULL: (&str, &str) = ("full", "full");
 
-/// Blocks of this many pixels a side are compared: the mean over a block is near to normally distributed also where single paths are
-/// rarely bright, which a z-test needs.
-const BLOCK: u32 = 8;
-
-/// Mean and standard error.
-pub type Block = ([f64; 3], [f64; 3]);
-
-/// Means and standard errors of blocks; pixels are independent.
-pub fn blocks(size: u32, value: impl Fn(u32, u32) -> [f64; 3], error: impl Fn(u32, u32) -> [f64; 3]) -> Vec<Block> {
-    let mut blocks = Vec::new();
-    for by in 0..size / BLOCK {
-        for bx in 0..size / BLOCK {
-            let (mut sum, mut variance) = ([0.0; 3], [0.0; 3]);
-            for y in by * BLOCK..(by + 1) * BLOCK {
-                for x in bx * BLOCK..(bx + 1) * BLOCK {
-                    let (v, e) = (value(x, y), error(x, y));
-                    for i in 0..3 {
-                        sum[i] += v[i];
-                        variance[i] += e[i] * e[i];
-                    }
-                }
-            }
-            let n = f64::from(BLOCK * BLOCK);
-            blocks.push((sum.map(|s| s / n), variance.map(|v| v.sqrt() / n)));
-        }
-    }
-    blocks
+/// Batches that the references' standard errors are from.
+fn batches(component: &str) -> u32 {
+    if component == "full" { 10 } else { 12 }
 }
 
-/// Share of blocks and channels whose difference is beyond four standard errors (normal: 6 in 100,000), and the ratio of the means.
-pub fn compare(mine: &[Block], theirs: &[Block]) -> (f64, f64) {
-    let total = |blocks: &[Block]| blocks.iter().flat_map(|(mean, _)| *mean).sum::<f64>();
-    let ratio = total(mine) / total(theirs);
-    // Rounding of f32 sums and of the references' half-float errors.
-    let floor = 1e-4 * total(theirs) / (3 * theirs.len()) as f64;
-    let mut beyond = 0;
-    for (a, b) in mine.iter().zip(theirs) {
-        for i in 0..3 {
-            let deviation = (a.1[i].powi(2) + b.1[i].powi(2) + floor * floor).sqrt();
-            beyond += usize::from((a.0[i] - b.0[i]).abs() > 4.0 * deviation);
-        }
-    }
-    (beyond as f64 / (3 * mine.len()) as f64, ratio)
-}
-
-/// What [`compare`] says of the tracer and a reference. `scale` multiplies the tracer's radiance: 1 but for the test of the test.
-fn disagreement(case: &Case, scale: f64) -> (f64, f64) {
+/// The test of every pixel against the reference with both standard errors. `scale` multiplies the tracer's radiance: 1 but for the test of
+/// the test.
+fn test(case: &Case, scale: f32) -> ZTest {
     let job = Job { pipeline: root().join("pipelines/reference.ron").to_string_lossy().into_owned(), ..Job::scene(&case.scene) }
         .set("component", case.component.0)
-        .set("paths", 1)
+        .set("paths", PATHS)
         .frames(case.frames)
         .keep(&["standard_error"]);
     let renderer = job.render();
-    let (mean, error) = (read(&renderer, "composed"), read(&renderer, "standard_error"));
-    let reference = exr(&case.reference.join(format!("{}.exr", case.component.1)));
-    let reference_error = exr(&case.reference.join(format!("{}_stderr.exr", case.component.1)));
-    let mine = blocks(mean.width, |x, y| rgb(&mean, x, y).map(|v| scale * v), |x, y| rgb(&error, x, y));
-    let theirs = blocks(mean.width, |x, y| reference_rgb(&reference, x, y), |x, y| reference_rgb(&reference_error, x, y));
-    compare(&mine, &theirs)
+    let scaled = |name: &str, scale: f32| {
+        let image = read(&renderer, name);
+        let data = image.data.iter().map(|v| v * scale).collect();
+        Picture::linear(image.width as usize, image.height as usize, image.channels as usize, data).without_alpha()
+    };
+    let (image, error) = (scaled("composed", scale), scaled("standard_error", scale));
+    let read = |end: &str| exr(&case.reference.join(format!("{}{end}.exr", case.component.1))).layer("").expect("plain channels");
+    let (reference, reference_error) = (read(""), read("_stderr"));
+    let ours = Estimate { picture: &image, standard_error: Some(&error), batches: Some(case.frames) };
+    let theirs = Estimate { picture: &reference, standard_error: Some(&reference_error), batches: Some(batches(case.component.1)) };
+    z_test(ours, theirs, None).expect("testable")
 }
 
 #[test]
@@ -90,13 +64,13 @@ fn the_path_tracer_agrees_with_another_renderer() {
     let data = root().join("tests/data/cornell_blocks");
     let cornell = root().join("assets/cornell.ron");
     let mut cases = vec![
-        case(cornell.clone(), data.clone(), DIRECT, 48),
-        case(cornell.clone(), data.clone(), ONE_BOUNCE, 64),
-        case(cornell, data, FULL, 64),
+        case(cornell.clone(), data.clone(), DIRECT, 8),
+        case(cornell.clone(), data.clone(), ONE_BOUNCE, 8),
+        case(cornell, data, FULL, 8),
     ];
     if let Some(shared) = shared() {
         let scene = |name: &str| (shared.join("scenes").join(name).join(format!("{name}.ron")), shared.join("reference").join(name));
-        for (name, component, frames) in [("cornell_objects", ONE_BOUNCE, 32), ("sponza", DIRECT, 32), ("sponza", ONE_BOUNCE, 32)] {
+        for (name, component, frames) in [("cornell_objects", ONE_BOUNCE, 8), ("sponza", DIRECT, 6), ("sponza", ONE_BOUNCE, 6)] {
             let (file, reference) = scene(name);
             cases.push(case(file, reference, component, frames));
         }
@@ -104,18 +78,27 @@ fn the_path_tracer_agrees_with_another_renderer() {
         println!("cornell_objects and sponza were not run: ../shared is not there");
     }
     for case in cases {
-        let (beyond, ratio) = disagreement(&case, 1.0);
+        let result = test(&case, 1.0);
         let name = case.scene.file_stem().expect("a name").to_string_lossy();
-        println!("{name}, {}: ratio of means {ratio:.4}, {:.3} % of blocks beyond four standard errors", case.component.0, 100.0 * beyond);
-        assert!((ratio - 1.0).abs() <= 0.005, "{name}, {}: ratio of means {ratio}", case.component.0);
-        assert!(beyond <= 0.0025, "{name}, {}: {:.2} % of blocks differ", case.component.0, 100.0 * beyond);
+        let ratio = result.ratio.expect("not black");
+        println!(
+            "{name}, {}: ratio of means {:.5} ± {:.5}, {:.3} % of pixels pass",
+            case.component.0,
+            ratio.value,
+            ratio.standard_error,
+            100.0 * result.passing
+        );
+        assert!((ratio.value - 1.0).abs() <= 0.005, "{name}, {}: {result:?}", case.component.0);
+        assert!(result.fair && result.tested == 256 * 256, "{name}, {}: {result:?}", case.component.0);
     }
 }
 
-/// A test of the test: two per cent too much energy is found.
+/// A test of the test: two per cent too much energy is found, by the pixels of direct light and by the ratio of the means of indirect light.
 #[test]
 fn two_per_cent_too_much_energy_is_found() {
-    let case = case(root().join("assets/cornell.ron"), root().join("tests/data/cornell_blocks"), ONE_BOUNCE, 48);
-    let (_, ratio) = disagreement(&case, 1.02);
-    assert!((ratio - 1.0).abs() > 0.005, "ratio of means {ratio}");
+    let of = |component| case(root().join("assets/cornell.ron"), root().join("tests/data/cornell_blocks"), component, 8);
+    let direct = test(&of(DIRECT), 1.02);
+    assert!(!direct.fair, "{direct:?}");
+    let ratio = test(&of(ONE_BOUNCE), 1.02).ratio.expect("not black");
+    assert!((ratio.value - 1.0).abs() > 0.005 && ratio.value - 1.0 > 5.0 * ratio.standard_error, "{ratio:?}");
 }

@@ -5,7 +5,7 @@ use std::{f64::consts::PI, fmt::Write, fs, path::PathBuf};
 
 use glam::DVec3;
 
-use crate::path_tracer::{Block, blocks};
+use crate::blocks::{Block, blocks};
 
 pub struct Triangle {
     corners: [DVec3; 3],

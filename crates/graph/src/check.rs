@@ -55,7 +55,8 @@ pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
         let current = values.get(name).cloned();
         // The end of a range may be too much beside another parameter's value (memory, say), and a preset may set what another option needs:
         // that is good to know, and no fault of the pipeline.
-        let worst = if matches!(param.kind, ParamKind::Int { .. }) || !pipeline.set.is_empty() { Severity::Warning } else { Severity::Error };
+        let worst =
+            if matches!(param.kind, ParamKind::Int { .. }) || !pipeline.set.is_empty() { Severity::Warning } else { Severity::Error };
         for value in variants(&param.kind).into_iter().filter(|v| Some(v) != current.as_ref()) {
             let when = format!("when `{name}` is `{value}`");
             let mut changed = values.clone();

@@ -43,7 +43,8 @@ pub struct Known {
 #[derive(Debug, Clone, Copy)]
 enum Value {
     Pictures(fn(&Metrics) -> Option<f64>),
-    Sequence,
+    /// From more than a picture and its reference.
+    Elsewhere,
 }
 
 impl Known {
@@ -52,16 +53,16 @@ impl Known {
         KNOWN.iter().find(|known| known.name == name)
     }
 
-    /// Whether it is of a sequence of frames ([`super::flicker`]) and not of a picture and its reference.
-    pub fn of_sequence(&self) -> bool {
-        matches!(self.value, Value::Sequence)
+    /// Whether a picture and its reference are all that it needs: [`super::flicker`] needs several frames, [`super::z_test`] standard errors.
+    pub fn of_two_pictures(&self) -> bool {
+        matches!(self.value, Value::Pictures(_))
     }
 
-    /// Its value; `None` where it is not defined.
+    /// Its value; `None` where it is not defined, and for what needs more than two pictures.
     pub fn of(&self, metrics: &Metrics) -> Option<f64> {
         match self.value {
             Value::Pictures(value) => value(metrics).filter(|v| v.is_finite()),
-            Value::Sequence => None,
+            Value::Elsewhere => None,
         }
     }
 }
@@ -125,12 +126,20 @@ pub const KNOWN: &[Known] = &[
     ),
     picture("ssim", "SSIM", "Mean structural similarity of the displayed pictures' luma, −1 to 1.", "1", Best::Highest, |m| m.ssim),
     Known {
+        name: "z_passing",
+        title: "pixels within noise",
+        doc: "Share of the pixels whose difference the standard errors of image and reference explain (z-test with Šidák's correction).",
+        unit: "1",
+        best: Best::Highest,
+        value: Value::Elsewhere,
+    },
+    Known {
         name: "flicker",
         title: "flicker",
         doc: "Mean magnitude of the second difference of pixels over frames, over the mean of the frames.",
         unit: "1",
         best: Best::Zero,
-        value: Value::Sequence,
+        value: Value::Elsewhere,
     },
 ];
 

@@ -172,11 +172,8 @@ const SWEEP: Shape = Shape {
         "small",
     ],
 };
-const SMALL: Shape = Shape {
-    what: "the small size",
-    required: &[],
-    optional: &["scenes", "sizes", "seeds", "frames", "measure", "sequence", "paths"],
-};
+const SMALL: Shape =
+    Shape { what: "the small size", required: &[], optional: &["scenes", "sizes", "seeds", "frames", "measure", "sequence", "paths"] };
 const VARIANT: Shape = Shape { what: "a variant", required: &["pipeline"], optional: &["set", "vary", "frames", "image"] };
 const SCENE: Shape = Shape { what: "a scene", required: &["scene"], optional: &["reference", "standard_error"] };
 const REFERENCE: Shape = Shape { what: "the reference", required: &[], optional: &["component", "paths"] };

@@ -19,6 +19,7 @@ use super::{
     document::Sweep,
     plan::Run,
     reference::{self, Reference, Task},
+    run::STANDARD_ERROR,
 };
 
 /// A sweep with its pipelines and scenes.
@@ -82,6 +83,8 @@ impl Prepared {
     pub(super) fn settings(&self, run: &Run) -> Settings {
         let mut keep = vec![self.sweep.image_of(run.variant).text.clone()];
         keep.extend(self.sweep.mask.as_ref().map(|mask| mask.resource.text.clone()));
+        let knows_its_noise = self.documents[run.variant].pipeline().resources.contains_key(STANDARD_ERROR);
+        keep.extend(knows_its_noise.then(|| STANDARD_ERROR.to_owned()));
         keep.dedup();
         let set = run.set.iter().map(|(name, value)| (name.clone(), value.clone())).collect();
         Settings { size: run.size, set, keep, seed: run.seed, ..Settings::default() }

@@ -30,6 +30,10 @@ const MOST_PATHS_A_FRAME: u32 = 256;
 pub(super) struct Reference {
     /// Linear radiance, R, G and B.
     pub picture: Picture,
+    /// Standard error of each of its values, where known.
+    pub standard_error: Option<Picture>,
+    /// Batches that it is from, where known.
+    pub batches: Option<u32>,
     pub facts: ReferenceFacts,
 }
 
@@ -110,7 +114,7 @@ impl Task<'_> {
             paths: Some(self.paths()),
             relative_standard_error: relative(&picture, &standard_error),
         };
-        Reference { picture, facts }
+        Reference { picture, standard_error: Some(standard_error), batches: Some(self.batches().0), facts }
     }
 }
 
@@ -130,7 +134,7 @@ pub(super) fn from_file(file: &Path, standard_error: Option<&Path>, size: (u32, 
         paths: None,
         relative_standard_error: standard_error.as_ref().and_then(|error| relative(&picture, error)),
     };
-    Ok(Reference { picture, facts })
+    Ok(Reference { picture, standard_error, batches: None, facts })
 }
 
 fn colours(file: &Path, size: (u32, u32)) -> Result<Picture, FileError> {

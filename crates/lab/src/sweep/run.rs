@@ -16,13 +16,16 @@ use super::{
 use crate::{
     facts,
     files::{FileError, Picture, write_png},
-    metrics::{self, ErrorMapKind, Mask, Metrics},
+    metrics::{self, ErrorMapKind, Estimate, Mask, Metrics},
     record::{FORMAT, FrameError, Pictures, Record, SceneFacts, Summary, Times, node_times},
     timing::{FrameSamples, serial_by_default, timed_frame},
 };
 
 /// Folder of the pictures, in the folder of the records.
 const PICTURES: &str = "pictures";
+
+/// The texture in which a pipeline tells its noise.
+pub(super) const STANDARD_ERROR: &str = "standard_error";
 
 /// What runs share.
 pub(super) struct Bench<'a> {
@@ -98,6 +101,7 @@ impl Bench<'_> {
         let image = self.image(run, &renderer)?;
         let mask = self.mask(&renderer)?;
         let mut errors = compare(&image, &reference, mask.as_ref())?.named();
+        errors.extend(passing(&renderer, &image, &reference, mask.as_ref())?.map(|share| ("z_passing".to_owned(), share)));
         let pictures = self.write_pictures(&inputs, &image, &reference, mask.as_ref())?;
         let sequence = self.sequence(run, &mut renderer, &mut errors, progress)?;
         let (samples, serial) = self.measure(run, &mut renderer)?;
@@ -242,4 +246,18 @@ fn compare(image: &Picture, reference: &Reference, mask: Option<&Mask>) -> Resul
         Some(mask) => metrics::compare_over(image, &reference.picture, mask)?,
         None => metrics::compare(image, &reference.picture)?,
     })
+}
+
+/// Share of the pixels whose difference noise explains, for pipelines that know their noise: those with a texture `standard_error`, whose
+/// alpha is the number of batches.
+fn passing(renderer: &Renderer, image: &Picture, reference: &Reference, mask: Option<&Mask>) -> Result<Option<f64>, SweepError> {
+    let Some(reference_error) = &reference.standard_error else { return Ok(None) };
+    let Ok(error) = renderer.read(STANDARD_ERROR) else { return Ok(None) };
+    let batches = error.data.iter().skip(3).step_by(4).fold(0.0_f32, |most, n| most.max(*n)) as u32;
+    if batches < 2 {
+        return Ok(None);
+    }
+    let ours = Estimate { picture: image, standard_error: Some(&rgb(error)), batches: Some(batches) };
+    let theirs = Estimate { picture: &reference.picture, standard_error: Some(reference_error), batches: reference.batches };
+    Ok(Some(metrics::z_test(ours, theirs, mask)?.passing))
 }

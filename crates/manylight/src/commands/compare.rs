@@ -145,7 +145,7 @@ fn text(metrics: &Metrics, test: Option<&ZTest>, map: Option<&(&Path, ErrorMap)>
         ("mean of image", format!("{:.6}", metrics.mean_image)),
         ("mean of reference", format!("{:.6}", metrics.mean_reference)),
     ];
-    lines.extend(KNOWN.iter().filter(|known| !known.of_sequence()).map(|known| (known.title, value(known, metrics))));
+    lines.extend(KNOWN.iter().filter(|known| known.of_two_pictures()).map(|known| (known.title, value(known, metrics))));
     let excluded = metrics.non_finite_image + metrics.non_finite_reference;
     let not_finite = match excluded {
         0 => "none".to_owned(),
