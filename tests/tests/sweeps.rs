@@ -8,7 +8,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use manylight::lab::record::{self, Record};
+use manylight::{
+    files::{Picture, write_exr},
+    lab::record::{self, Record},
+};
 
 use crate::support::{command, manylight, root};
 
@@ -197,6 +200,15 @@ fn references_on_disk_must_fit() {
     sweep(&["--reference", &reference]).expect(1).says(&["onebounce.exr", "256×256", "32×24"]);
     sweep(&["--reference", "nowhere.exr"]).expect(1).says(&["nowhere.exr"]);
     sweep(&["--reference", &reference, "--scene", "moving"]).expect(2).says(&["--scene once"]);
+    assert!(!Path::new(&out).exists(), "nothing was run, nothing may be written");
+    // What is not a number is left out, and said.
+    let holey = path(folder.path(), "holey.exr");
+    let mut data = vec![0.1; 32 * 24 * 3];
+    data[100] = f32::NAN;
+    write_exr(Path::new(&holey), &Picture::linear(32, 24, 3, data)).expect("writable");
+    sweep(&["--reference", &holey]).expect(0).says(&["(1 pixels are not finite"]);
+    let report = fs::read_to_string(Path::new(&out).join("report.html")).expect("readable");
+    assert!(report.contains("1 pixel of simple clusters=16"), "the report says so");
 }
 
 /// Every sweep of `pipelines/sweeps`, in its small size.

@@ -71,6 +71,8 @@ pub struct Record {
     pub memory: u64,
     /// Errors by the names of [`crate::metrics`]; those that are not defined (a ratio to black) are absent.
     pub metrics: IndexMap<String, f64>,
+    /// Pixels that do not count because image or reference is not finite there.
+    pub not_finite: u64,
     /// Errors over time, when the sweep asks for a sequence.
     pub sequence: Vec<FrameError>,
     /// Files of the pictures, relative to the folder of the records.
@@ -327,6 +329,7 @@ pub(crate) mod tests {
             },
             memory: 1 << 20,
             metrics: [("relative_mean_absolute_error".to_owned(), error), ("relative_rmse".to_owned(), 2.0 * error)].into_iter().collect(),
+            not_finite: 0,
             sequence: Vec::new(),
             pictures: Pictures::default(),
         }

@@ -3,7 +3,10 @@
 use indexmap::IndexSet;
 use serde_json::Value;
 
-use super::{study::Study, text::number};
+use super::{
+    study::Study,
+    text::{count, number},
+};
 use crate::record::Record;
 
 /// Facts above the plots, in sentences.
@@ -39,13 +42,20 @@ impl Heading {
                 warnings.push(format!("The runs are of different {what}, their times do not compare: {}.", values.join("; ")));
             }
         }
-        let compared = |r: &Record| (r.scene.hash.clone(), r.reference.hash.clone(), r.image.clone(), r.mask.clone());
+        let compared = |r: &Record| (r.scene.hash.clone(), r.reference.hash.clone(), r.mask.clone());
         for group in &study.groups {
             let first = compared(&records[group.runs[0]]);
             if group.runs.iter().any(|&run| compared(&records[run]) != first) {
-                let what = "differ in scene files, reference, image or mask, their errors do not compare";
+                let what = "differ in scene files, reference or mask, their errors do not compare";
                 warnings.push(format!("The runs of {} {what}.", group.title()));
             }
+        }
+        for record in records.iter().filter(|r| r.not_finite > 0) {
+            let run = &record.run;
+            warnings.push(format!(
+                "{} of {run} are not finite in the image or the reference and do not count.",
+                count(record.not_finite as usize, "pixel")
+            ));
         }
         Self { facts, warnings }
     }

@@ -100,7 +100,9 @@ impl Bench<'_> {
         }
         let image = self.image(run, &renderer)?;
         let mask = self.mask(&renderer)?;
-        let mut errors = compare(&image, &reference, mask.as_ref())?.named();
+        let compared = compare(&image, &reference, mask.as_ref())?;
+        let not_finite = (compared.non_finite_image + compared.non_finite_reference) as u64;
+        let mut errors = compared.named();
         errors.extend(passing(&renderer, &image, &reference, mask.as_ref())?.map(|share| ("z_passing".to_owned(), share)));
         let pictures = self.write_pictures(&inputs, &image, &reference, mask.as_ref())?;
         let sequence = self.sequence(run, &mut renderer, &mut errors, progress)?;
@@ -145,6 +147,7 @@ impl Bench<'_> {
             },
             memory: renderer.memory_report().total(),
             metrics: errors,
+            not_finite,
             sequence,
             pictures,
         })

@@ -74,7 +74,11 @@ impl Teller {
                 let error = record.metrics.get(&self.metric).map_or("undefined".to_owned(), |value| format!("{value:.4}"));
                 let title = Known::find(&self.metric).map_or(self.metric.as_str(), |known| known.title);
                 let time = record.times.frame();
-                self.line(&format!("[{}/{of}] {}: {title} {error}, {time:.1} ms a frame", index + 1, record.run));
+                let left_out = match record.not_finite {
+                    0 => String::new(),
+                    n => format!(" ({n} pixels are not finite in the image or the reference and do not count)"),
+                };
+                self.line(&format!("[{}/{of}] {}: {title} {error}, {time:.1} ms a frame{left_out}", index + 1, record.run));
             }
             Event::Failed { run, reason } => self.line(&format!("failed: {}\n{reason}", run.name)),
         }
