@@ -13,6 +13,8 @@ pub struct Sheet {
     pub metric: String,
     /// The columns of tables, by name.
     pub metrics: Vec<String>,
+    /// What the records should bear out.
+    pub claims: Vec<Claim>,
     /// Tables of a paper.
     pub papers: Vec<Paper>,
     /// Error over time of other renderers.
@@ -40,6 +42,19 @@ impl Axis {
             Self::Picture => "picture",
         }
     }
+}
+
+/// A variant is cheaper than another, or more accurate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Claim {
+    /// The variant.
+    pub variant: String,
+    /// The one that it is compared with.
+    pub than: String,
+    /// Largest ratio of their times.
+    pub time: f64,
+    /// Largest ratio of their errors.
+    pub error: f64,
 }
 
 /// A table of a paper, as printed there.

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use super::{
+    claims,
     figures::{self, Figure},
     heading::Heading,
     papers,
@@ -43,6 +44,9 @@ pub fn markdown(sheet: &Sheet, records: &[Record]) -> BookPage {
     }
     for group in &study.groups {
         page.paragraph(&format!("## {}", escape(&group.title())));
+        for verdict in claims::verdicts(&study, group) {
+            page.paragraph(&escape(&verdict));
+        }
         page.figure(sheet, &figures::scatter(&study, group));
         page.paragraph(tables::runs(&study, group, &metrics).markdown().trim_end());
         page.paragraph(&escape(&tables::front_note(&study)));

@@ -4,6 +4,7 @@
 //! say in words what they leave out.
 
 mod book;
+mod claims;
 mod figures;
 mod fit;
 mod front;

@@ -3,6 +3,7 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{
+    claims,
     figures::{self, Figure},
     heading::Heading,
     names::{Metric, metric},
@@ -66,6 +67,7 @@ fn sections(study: &Study<'_>, load: Load<'_>) -> Vec<Section> {
     };
     let groups = || study.groups.iter();
     let all = |figures: Vec<Figure>| -> Vec<Markup> { figures.iter().map(figure).collect() };
+    add("claims", "Claims", groups().filter_map(|g| titled(g, claims_of(study, g))).collect());
     add("cost", "Error against time", groups().map(|g| figure(&figures::scatter(study, g))).collect());
     add("stages", "Time by stage", groups().map(|g| stages(study, g)).collect());
     add("knobs", "Over each knob", groups().flat_map(|g| all(figures::knobs(study, g))).collect());
@@ -118,6 +120,11 @@ fn explained(study: &Study<'_>, metrics: &[&str]) -> Markup {
         p.note { (tables::front_note(study)) }
         dl.note { @for metric in &metrics { @if let Some(doc) = metric.doc { dt { (metric.axis) } dd { (doc) } } } }
     }
+}
+
+fn claims_of(study: &Study<'_>, group: &Group<'_>) -> Option<Markup> {
+    let verdicts = claims::verdicts(study, group);
+    (!verdicts.is_empty()).then(|| html! { ul { @for verdict in &verdicts { li { (verdict) } } } })
 }
 
 fn papers_of(study: &Study<'_>) -> Vec<Markup> {

@@ -52,6 +52,12 @@ impl Sweep {
                 out.push(fault.help(suggest(&metric.text, metrics::KNOWN.iter().map(|known| known.name))));
             }
         }
+        for name in self.claims.iter().flat_map(|(_, names)| names) {
+            if !self.variants.iter().any(|variant| variant.name.text == name.text) {
+                let fault = Diagnostic::error(format!("there is no variant `{}`", name.text), name.span.clone());
+                out.push(fault.help(suggest(&name.text, self.variants.iter().map(|variant| variant.name.text.as_str()))));
+            }
+        }
         self.check_number(&mut out);
         if self.sequence.is_some() {
             for reference in self.scenes.iter().filter_map(|scene| scene.reference.as_ref()) {

@@ -15,7 +15,7 @@ use manylight_graph::{
 use super::extras;
 use crate::{
     metrics::Condition,
-    sheet::{Axis, Curve, Paper},
+    sheet::{Axis, Claim, Curve, Paper},
 };
 
 /// What a sweep asks for.
@@ -61,6 +61,8 @@ pub struct Sweep {
     pub metrics: Vec<Spanned>,
     /// Which pixels count.
     pub mask: Option<MaskUse>,
+    /// What the records should bear out, with the places of the two variants' names.
+    pub claims: Vec<(Claim, [Spanned; 2])>,
     /// Figures of papers.
     pub papers: Vec<Paper>,
     /// Other renderers.
@@ -280,6 +282,7 @@ fn read_sweep(reader: &mut Reader, tree: &Tree, small: bool) -> Option<Sweep> {
         metric: text(reader, "metric").unwrap_or(metric),
         metrics: metrics.unwrap_or_default(),
         mask: fields.get("mask").and_then(|tree| read_mask(reader, tree)),
+        claims: fields.get("claims").map(|tree| extras::claims(reader, tree)).unwrap_or_default(),
         papers: fields.get("papers").map(|tree| extras::papers(reader, tree)).unwrap_or_default(),
         curves: fields.get("curves").map(|tree| extras::curves(reader, tree)).unwrap_or_default(),
     };

@@ -1,11 +1,15 @@
 //! Parts of a sweep's document that stand for themselves: the path of the light; what goes to the report, tables of papers and curves of other renderers.
 
 use glam::Vec3;
-use manylight_graph::ron::{Kind, Reader, Shape, Tree, suggest};
+use manylight_graph::{
+    Spanned,
+    ron::{Kind, Reader, Shape, Tree, suggest},
+};
 
-use crate::sheet::{Axis, Curve, Paper};
+use crate::sheet::{Axis, Claim, Curve, Paper};
 
 const PAPER: Shape = Shape { what: "a paper's table", required: &["source", "unit", "rows"], optional: &[] };
+const CLAIM: Shape = Shape { what: "a claim", required: &["variant", "than"], optional: &["time", "error"] };
 const CURVE: Shape = Shape { what: "a curve", required: &["name", "scene", "metric", "points"], optional: &[] };
 
 const LIGHT_KEY: Shape = Shape { what: "a place of the light", required: &["time", "position", "target"], optional: &[] };
@@ -42,6 +46,20 @@ fn vector(reader: &mut Reader, tree: &Tree) -> Option<Vec3> {
             None
         }
     }
+}
+
+pub(super) fn claims(reader: &mut Reader, tree: &Tree) -> Vec<(Claim, [Spanned; 2])> {
+    reader.list(tree, "claims").iter().filter_map(|tree| claim(reader, tree)).collect()
+}
+
+fn claim(reader: &mut Reader, tree: &Tree) -> Option<(Claim, [Spanned; 2])> {
+    let fields = reader.record(tree, &CLAIM)?;
+    let text = |reader: &mut Reader, name: &str| fields.get(name).and_then(|t| reader.text(t, "the name of a variant in quotes"));
+    let (variant, than) = (text(reader, "variant"), text(reader, "than"));
+    let most = |reader: &mut Reader, name: &str| fields.get(name).map_or(Some(1.0), |t| reader.float(t, "a ratio"));
+    let (time, error) = (most(reader, "time"), most(reader, "error"));
+    let (variant, than) = (variant?, than?);
+    Some((Claim { variant: variant.text.clone(), than: than.text.clone(), time: time?, error: error? }, [variant, than]))
 }
 
 pub(super) fn papers(reader: &mut Reader, tree: &Tree) -> Vec<Paper> {

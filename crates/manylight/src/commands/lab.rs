@@ -102,6 +102,7 @@ pub fn sheet(sweep: &Sweep) -> Sheet {
         axis: sweep.axis,
         metric: sweep.metric.text.clone(),
         metrics: sweep.metrics.iter().map(|metric| metric.text.clone()).collect(),
+        claims: sweep.claims.iter().map(|(claim, _)| claim.clone()).collect(),
         papers: sweep.papers.clone(),
         curves: sweep.curves.clone(),
     }
