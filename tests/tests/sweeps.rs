@@ -139,10 +139,10 @@ fn faults_of_sweeps_are_told_at_their_place() {
         &good("\"a\": (pipeline: \"acrsm\", set: {\"cluster\": 64})", ""),
         &["no parameter `cluster`", "did you mean `clusters`", "small.ron:1"],
     );
-    fault(&good("\"a\": (pipeline: \"acrsm\", set: {\"clusters\": 5})", ""), &["5 is no value of `clusters`", "16"]);
+    fault(&good("\"a\": (pipeline: \"acrsm\", set: {\"clusters\": 5})", ""), &["`5` is no value of `clusters`", "16"]);
     fault(
         &good("\"a\": (pipeline: \"acrsm\")", ", vary: [{\"visibility\": [\"pcss\", \"pcs\"]}]"),
-        &["\"pcs\" is no value", "did you mean `pcss`"],
+        &["`pcs` is no value", "did you mean `pcss`"],
     );
     fault(
         &good("\"a\": (pipeline: \"acrsm\")", ", vary: [{\"clusters\": [16, 32], \"tiles\": [1]}]"),
