@@ -45,7 +45,7 @@ fn path(folder: &Path, name: &str) -> String {
 
 /// Everything but when it was done and how long it took.
 fn timeless(folder: &Path) -> Vec<Record> {
-    let (mut records, damaged) = record::read(&folder.join("records.jsonl")).expect("readable");
+    let record::Lines { mut records, damaged, .. } = record::read(&folder.join("records.jsonl")).expect("readable");
     assert!(damaged.is_empty(), "{damaged:?}");
     for record in &mut records {
         record.date.clear();
@@ -97,12 +97,18 @@ fn a_stopped_sweep_and_one_in_parts_give_the_records_of_one_that_ran_through() {
     sweep("parts", &["--shard", "2/2"]).expect(0).says(&["3 of 6 runs", "3 runs are still to be done"]);
     sweep("parts", &["--shard", "1/2"]).expect(0).says(&["6 of 6 runs"]);
     sweep("parts", &["--report"]).expect(0).says(&["6 of 6 runs"]);
-    let mut parts = timeless_parts(&folder.path().join("parts"));
-    parts.sort_by_key(|r| whole.iter().position(|w| w.run == r.run));
-    assert_eq!(parts, whole);
+    sweep("parts", &[]).expect(0).says(&["(6 were there already)"]);
+    assert_eq!(timeless(&folder.path().join("parts")), whole);
+
+    // A last line without an end is no trouble for the next.
+    let records = folder.path().join("whole/records.jsonl");
+    let text = fs::read_to_string(&records).expect("readable");
+    let lines: Vec<&str> = text.lines().collect();
+    fs::write(&records, lines[..5].join("\n")).expect("writable");
+    sweep("whole", &[]).expect(0).says(&["(5 were there already)"]);
+    assert_eq!(timeless(&folder.path().join("whole")), whole);
 
     // A damaged line is told, and its run alone is done again.
-    let records = folder.path().join("whole/records.jsonl");
     let text = fs::read_to_string(&records).expect("readable");
     let damaged: Vec<String> =
         text.lines().enumerate().map(|(i, l)| if i == 2 { l.replace("\"rmse\"", "\"rm") } else { l.to_owned() }).collect();
@@ -110,16 +116,9 @@ fn a_stopped_sweep_and_one_in_parts_give_the_records_of_one_that_ran_through() {
     sweep("whole", &[]).expect(0).says(&["records.jsonl:3", "(5 were there already)"]);
     assert_eq!(timeless(&folder.path().join("whole")), whole);
     let html = fs::read_to_string(folder.path().join("whole/report.html")).expect("readable");
-    assert!(!html.contains("http://") || !html.contains("src=\"http"), "the report must not need a network");
-}
-
-fn timeless_parts(folder: &Path) -> Vec<Record> {
-    let all: String = ["records-1-of-2.jsonl", "records-2-of-2.jsonl"]
-        .iter()
-        .map(|name| fs::read_to_string(folder.join(name)).expect("readable"))
-        .collect();
-    fs::write(folder.join("records.jsonl"), all).expect("writable");
-    timeless(folder)
+    for link in ["src=\"http", "href=\"http", "url(http", "@import"] {
+        assert!(!html.contains(link), "the report must not need a network: {link}");
+    }
 }
 
 #[test]
@@ -154,6 +153,11 @@ fn faults_of_sweeps_are_told_at_their_place() {
     fault(&good("\"a\": (pipeline: \"acrsm\")", ", metric: \"flipp\""), &["no metric `flipp`", "did you mean `flip`"]);
     fault(&good("\"a\": (pipeline: \"acrsm\")", ", reference: (component: \"one\")"), &["no component `one`"]);
     fault(&good("\"a\": (pipeline: \"acrsm\")", ", frames: 0"), &["0 is out of range"]);
+    fault(&good("\"a\": (pipeline: \"acrsm\")", ", claims: [(variant: \"a\", than: \"b\")]"), &["no variant `b`"]);
+    fault(
+        &good("\"a\": (pipeline: \"acrsm\", set: {\"tiles\": 1})", ", vary: [{\"tiles\": [1, 2]}]"),
+        &["`tiles` varies in the whole sweep, but variant `a` sets it"],
+    );
     fault(
         "Sweep(doc: \"?\", variants: {\"a\": (pipeline: \"acrsm\")}, scenes: [\"cornel\"])",
         &["no scene `cornel`", "did you mean `cornell`"],
@@ -175,7 +179,7 @@ fn sequences_follow_the_path_of_the_light() {
     let run = |text: &str| {
         let (folder, file) = with_sweep(text);
         manylight(&["sweep", &file, "--out", &path(folder.path(), "out"), "--cache", &path(folder.path(), "cache")]).expect(0);
-        record::read(&folder.path().join("out/records.jsonl")).expect("readable").0.remove(0)
+        record::read(&folder.path().join("out/records.jsonl")).expect("readable").records.remove(0)
     };
     let moving = still.replace("sequence:", &format!("{path_of_light}, sequence:"));
     let (still, moving) = (run(still), run(&moving));
@@ -185,7 +189,7 @@ fn sequences_follow_the_path_of_the_light() {
         // Compared with the right time, the error is that of the method: with a wrong one, light would be on another wall.
         for frame in &record.sequence {
             let error = frame.metrics["relative_mean_absolute_error"];
-            assert!(error < 0.5, "{error} at {} s", frame.time);
+            assert!(error < 0.8, "{error} at {} s", frame.time);
         }
     }
     assert!(moving.metrics["flicker"] > still.metrics["flicker"]);
@@ -226,7 +230,7 @@ fn the_sweeps_of_the_papers_run() {
         let out = folder.path().join(&name);
         let start = Instant::now();
         manylight(&["sweep", &name, "--small", "--out", &out.to_string_lossy(), "--cache", &cache]).expect(0);
-        let (records, damaged) = record::read(&out.join("records.jsonl")).expect("readable");
+        let record::Lines { records, damaged, .. } = record::read(&out.join("records.jsonl")).expect("readable");
         println!("{name}: {} runs in {:.1} s", records.len(), start.elapsed().as_secs_f64());
         assert!(damaged.is_empty() && records.len() >= 2, "{name}");
         for record in &records {
@@ -247,7 +251,7 @@ fn a_tuned_preset_renders() {
         manylight(&[&own, more].concat())
     };
     tune(&["--error", "1e9", "--out", &at("fast.ron")]).expect(0).says(&["ms a frame", "fast.ron"]);
-    let (records, _) = record::read(&folder.path().join("records/records.jsonl")).expect("readable");
+    let records = record::read(&folder.path().join("records/records.jsonl")).expect("readable").records;
     let fastest = records.iter().min_by(|a, b| a.times.frame().total_cmp(&b.times.frame())).expect("records");
     let preset = fs::read_to_string(folder.path().join("fast.ron")).expect("readable");
     for (name, value) in &fastest.set {

@@ -1,14 +1,17 @@
 //! What a result depends on, as JSON for scripts.
 
-use manylight_gpu::Gpu;
+use manylight_gpu::{Gpu, GpuKind};
 use manylight_graph::{plan::Plan, value::Value as Parameter};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-/// Name, kind, backend and driver of the adapter.
+/// Name, kind, backend and driver of the adapter; of a software adapter also the threads that the machine has.
 pub fn adapter(gpu: &Gpu) -> Value {
     let info = gpu.adapter_info();
+    // What a software adapter runs on decides its times.
+    let threads = if gpu.kind() == GpuKind::Software { std::thread::available_parallelism().ok().map(|n| n.get()) } else { None };
     json!({
+        "threads": threads,
         "name": info.name,
         "kind": gpu.kind().name(),
         "backend": format!("{:?}", info.backend),

@@ -51,6 +51,12 @@ pub struct Record {
     pub time: f64,
     /// Frames a second of scene time; `None`: time stands still.
     pub fps: Option<f64>,
+    /// Times, positions and targets of the first light, where the sweep moves it.
+    #[serde(default)]
+    pub light_path: Vec<(f64, [f32; 3], [f32; 3])>,
+    /// Frames of the sequence after the picture, and every how many of them one is compared.
+    #[serde(default)]
+    pub sequence_frames: Option<[u32; 2]>,
     /// Seed of everything random.
     pub seed: u32,
     /// The resource that is compared.
@@ -71,6 +77,9 @@ pub struct Record {
     pub memory: u64,
     /// Errors by the names of [`crate::metrics`]; those that are not defined (a ratio to black) are absent.
     pub metrics: IndexMap<String, f64>,
+    /// Pixels that count.
+    #[serde(default)]
+    pub counted: u64,
     /// Pixels that do not count because image or reference is not finite there.
     pub not_finite: u64,
     /// Errors over time, when the sweep asks for a sequence.
@@ -116,7 +125,8 @@ pub struct Times {
     pub gpu: Option<Summary>,
     /// To record and submit.
     pub cpu: Option<Summary>,
-    /// All frames until the picture was taken, together: what a picture costs from nothing.
+    /// Of as many frames as there are until the picture: what a picture costs when it is not the next of many. Building the pipeline, the
+    /// hierarchy and points that stay is not part of it.
     pub until_picture: f64,
     /// Node by node, in the order of the plan.
     pub nodes: Vec<NodeTime>,
@@ -229,32 +239,48 @@ impl std::fmt::Display for Damage {
     }
 }
 
-/// Reads all records of a file; a file that is not there has none. Lines that are no records are told.
+/// What a file of records holds.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Lines {
+    /// Its records, in order.
+    pub records: Vec<Record>,
+    /// Lines in another format than [`FORMAT`].
+    pub foreign: Vec<String>,
+    /// Lines that are no records.
+    pub damaged: Vec<Damage>,
+    /// Whether the last line has an end, so that another can be added.
+    pub complete: bool,
+}
+
+/// Reads all records of a file; a file that is not there has none.
 ///
 /// # Errors
 /// The file is there and cannot be read.
-pub fn read(file: &Path) -> Result<(Vec<Record>, Vec<Damage>), FileError> {
+pub fn read(file: &Path) -> Result<Lines, FileError> {
     let bytes = match fs::read(file) {
         Ok(bytes) => bytes,
-        Err(e) if e.kind() == ErrorKind::NotFound => return Ok((Vec::new(), Vec::new())),
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(Lines { complete: true, ..Lines::default() }),
         Err(e) => return Err(FileError::read(file, e)),
     };
-    let (mut records, mut damaged) = (Vec::new(), Vec::new());
+    let mut lines = Lines { complete: bytes.is_empty() || bytes.ends_with(b"\n"), ..Lines::default() };
     for (index, line) in bytes.split(|b| *b == b'\n').enumerate() {
         if line.iter().all(u8::is_ascii_whitespace) {
             continue;
         }
-        let reason = match serde_json::from_slice::<Record>(line) {
-            Ok(record) if record.format == FORMAT => {
-                records.push(record);
-                continue;
-            }
-            Ok(record) => format!("format {}, this version reads {FORMAT}", record.format),
-            Err(e) => e.to_string(),
-        };
-        damaged.push(Damage { file: file.to_owned(), line: index + 1, reason });
+        match serde_json::from_slice::<Record>(line) {
+            Ok(record) if record.format == FORMAT => lines.records.push(record),
+            _ if format_of(line).is_some_and(|format| format != FORMAT) => lines.foreign.push(String::from_utf8_lossy(line).into_owned()),
+            Ok(_) => {}
+            Err(e) => lines.damaged.push(Damage { file: file.to_owned(), line: index + 1, reason: e.to_string() }),
+        }
     }
-    Ok((records, damaged))
+    Ok(lines)
+}
+
+/// The format of a line, if it is a record of any.
+fn format_of(line: &[u8]) -> Option<u32> {
+    let value: serde_json::Value = serde_json::from_slice(line).ok()?;
+    u32::try_from(value.get("format")?.as_u64()?).ok()
 }
 
 /// Adds a record at the end of a file and sees that it is on the disk.
@@ -268,13 +294,14 @@ pub fn append(file: &Path, record: &Record) -> Result<(), FileError> {
     out.write_all(line.as_bytes()).and_then(|()| out.sync_data()).map_err(|e| failed(&e))
 }
 
-/// Replaces a file by these records.
+/// Replaces a file by these records and lines of other formats.
 ///
 /// # Errors
 /// The file cannot be written; the old one stays.
-pub fn write(file: &Path, records: &[Record]) -> Result<(), FileError> {
+pub fn write(file: &Path, records: &[Record], foreign: &[String]) -> Result<(), FileError> {
     let lines: Result<String, _> = records.iter().map(line).collect();
-    write_text(file, &lines.map_err(|e| FileError::write(file, &e))?)
+    let foreign: String = foreign.iter().map(|line| format!("{line}\n")).collect();
+    write_text(file, &(lines.map_err(|e| FileError::write(file, &e))? + &foreign))
 }
 
 fn line(record: &Record) -> Result<String, std::io::Error> {
@@ -306,6 +333,8 @@ pub(crate) mod tests {
             measured: 8,
             time: 0.0,
             fps: None,
+            light_path: Vec::new(),
+            sequence_frames: None,
             seed: 0,
             image: "indirect".into(),
             reference: ReferenceFacts {
@@ -329,6 +358,7 @@ pub(crate) mod tests {
             },
             memory: 1 << 20,
             metrics: [("relative_mean_absolute_error".to_owned(), error), ("relative_rmse".to_owned(), 2.0 * error)].into_iter().collect(),
+            counted: 65536,
             not_finite: 0,
             sequence: Vec::new(),
             pictures: Pictures::default(),
@@ -343,15 +373,16 @@ pub(crate) mod tests {
         for record in &records {
             append(&file, record).expect("writable");
         }
-        assert_eq!(read(&file).expect("readable"), (records.to_vec(), Vec::new()));
+        let whole = read(&file).expect("readable");
+        assert!(whole.records == records && whole.complete && whole.damaged.is_empty());
         let other = Record { format: FORMAT + 1, ..records[0].clone() };
         let text = fs::read_to_string(&file).expect("readable");
         fs::write(&file, format!("{{\"half\": \n\n{text}{}\n\u{0}", serde_json::to_string(&other).expect("JSON"))).expect("writable");
-        let (good, damaged) = read(&file).expect("readable");
-        assert_eq!(good, records);
-        assert_eq!(damaged.iter().map(|d| d.line).collect::<Vec<_>>(), [1, 5, 6]);
-        assert!(damaged[1].reason.contains("format 2"), "{}", damaged[1]);
-        assert_eq!(read(&folder.path().join("nothing.jsonl")).expect("no file, no records"), (Vec::new(), Vec::new()));
+        let lines = read(&file).expect("readable");
+        assert!(lines.records == records && !lines.complete);
+        assert_eq!(lines.damaged.iter().map(|d| d.line).collect::<Vec<_>>(), [1, 6]);
+        assert_eq!(lines.foreign, [serde_json::to_string(&other).expect("JSON")], "another format is not ours to throw away");
+        assert!(read(&folder.path().join("nothing.jsonl")).expect("no file, no records").complete);
     }
 
     #[test]

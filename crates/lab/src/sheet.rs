@@ -76,6 +76,8 @@ pub struct Curve {
     pub name: String,
     /// The scene that it is of.
     pub scene: String,
+    /// Width and height of its pictures: it is drawn beside runs of that size.
+    pub size: [u32; 2],
     /// The metric.
     pub metric: String,
     /// Milliseconds and error.

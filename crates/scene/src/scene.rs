@@ -121,13 +121,15 @@ impl Scene {
         features.into_iter().map(|(name, on)| (name.to_owned(), on)).collect()
     }
 
-    /// Moves the first light along a path instead of as its file says: times in seconds, positions and targets in world space. Its strength
+    /// Moves the first spot light (or the first light, if there is none) along a path instead of as its file says: times in seconds, positions and targets in world space. Its strength
     /// is the one it has at the first time. The hash becomes another.
     ///
     /// # Errors
     /// Why there is no such path, in words.
     pub fn move_light(&mut self, path: &[(f64, Vec3, Vec3)]) -> Result<(), &'static str> {
-        let light = self.lights.first_mut().ok_or("the scene has no light")?;
+        let is_spot = |light: &Light| matches!(light.shape, LightShape::Spot { .. });
+        let index = self.lights.iter().position(is_spot).unwrap_or(0);
+        let light = self.lights.get_mut(index).ok_or("the scene has no light")?;
         let first = path.first().ok_or("the path has no point")?;
         let strength = light.pose.at(first.0).strength;
         let keys = path.iter().map(|&(time, position, target)| (time, LightPose { position, target, strength })).collect();

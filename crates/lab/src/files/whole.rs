@@ -33,7 +33,8 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> Resul
     let guard = RemoveOnDrop(Some(&temporary));
     let mut writer = BufWriter::new(file);
     fill(&mut writer)?;
-    writer.flush().map_err(|e| FileError::write(path, &e))?;
+    // On the disk before it has its name: a power cut must not leave an empty file where an older one was.
+    writer.flush().and_then(|()| writer.get_ref().sync_data()).map_err(|e| FileError::write(path, &e))?;
     drop(writer);
     fs::rename(&temporary, path).map_err(|e| FileError::write(path, &e))?;
     guard.keep();

@@ -44,6 +44,13 @@ impl Heading {
         }
         let compared = |r: &Record| (r.scene.hash.clone(), r.reference.hash.clone(), r.mask.clone());
         for group in &study.groups {
+            let counted = |run: &usize| records[*run].counted;
+            if group.runs.iter().map(counted).min() != group.runs.iter().map(counted).max() {
+                warnings.push(format!(
+                    "The runs of {} count different pixels, as their masks differ: their errors hardly compare.",
+                    group.title()
+                ));
+            }
             let first = compared(&records[group.runs[0]]);
             if group.runs.iter().any(|&run| compared(&records[run]) != first) {
                 let what = "differ in scene files, reference or mask, their errors do not compare";

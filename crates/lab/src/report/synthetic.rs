@@ -67,6 +67,7 @@ pub fn sweep() -> (Sheet, Vec<Record>) {
         curves: vec![Curve {
             name: "Mitsuba path, 16 cores".into(),
             scene: "cornell".into(),
+            size: [256, 256],
             metric: "relative_rmse".into(),
             points: vec![(20.0, 0.9), (80.0, 0.45), (320.0, 0.22)],
         }],

@@ -100,6 +100,14 @@ impl Sweep {
                 out.push(fault);
             }
         }
+        for knob in self.vary.iter().flat_map(|zip| &zip.0) {
+            let own = variant.vary.iter().flat_map(|zip| &zip.0).any(|other| other.name == knob.name);
+            if let Some((name, value)) = variant.set.iter().find(|(name, _)| *name == knob.name && !own) {
+                let message = format!("`{name}` varies in the whole sweep, but variant `{}` sets it", variant.name.text);
+                let fault = Diagnostic::error(message, value.name_span.clone()).and(knob.values[0].name_span.clone(), "varied here");
+                out.push(fault.help("remove one of them, or let the variants vary it that should"));
+            }
+        }
         let textures = || {
             let is_texture = |kind: &ResourceKind| matches!(kind, ResourceKind::Texture { .. });
             pipeline.resources.iter().filter(move |(_, r)| is_texture(&r.kind)).map(|(name, _)| name.as_str())

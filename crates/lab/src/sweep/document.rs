@@ -239,8 +239,8 @@ fn read_sweep(reader: &mut Reader, tree: &Tree, small: bool) -> Option<Sweep> {
     }
     let fields = reader.record(tree, &SWEEP)?;
     let full = read_extent(reader, &fields);
-    let lesser = fields.get("small").and_then(|tree| Some((reader.record(tree, &SMALL)?, tree.range.clone())));
-    let lesser = lesser.map(|(fields, _)| {
+    let lesser = fields.get("small").and_then(|tree| reader.record(tree, &SMALL));
+    let lesser = lesser.map(|fields| {
         let mut extent = read_extent(reader, &fields);
         extent.paths = count(reader, &fields, "paths", MOST_PATHS);
         extent
@@ -344,7 +344,7 @@ fn count(reader: &mut Reader, fields: &Fields<'_>, name: &str, most: i64) -> Opt
     fields.get(name).and_then(|tree| in_range(reader, tree, "a count", 1, most))
 }
 
-fn read_size(reader: &mut Reader, tree: &Tree) -> Option<(u32, u32)> {
+pub(super) fn read_size(reader: &mut Reader, tree: &Tree) -> Option<(u32, u32)> {
     match &tree.kind {
         Kind::Tuple(None, items) if items.len() == 2 => {
             let side = |reader: &mut Reader, tree: &Tree| in_range(reader, tree, "a side in pixels", 1, LARGEST_SIDE);

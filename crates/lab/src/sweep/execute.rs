@@ -1,7 +1,7 @@
 //! All runs of a sweep: what is done is kept, the rest is done and added.
 
 use std::{
-    collections::HashMap,
+    collections::{BTreeMap, HashMap},
     fs,
     path::{Path, PathBuf},
     time::{Duration, Instant},
@@ -11,6 +11,7 @@ use manylight_gpu::Gpu;
 
 use super::{
     SweepError,
+    document::Sweep,
     plan::{Run, shard},
     prepare::Prepared,
     run::Bench,
@@ -69,37 +70,38 @@ pub struct Outcome {
     pub missing: usize,
 }
 
-/// Does every run that has no record of the same inputs yet.
+/// Does every run that has no record of the same inputs yet. Without a part given, all records come to lie in [`RECORDS`], those of parts
+/// as well.
 ///
 /// # Errors
-/// A file cannot be read or written (a full disk); what was done until then is kept. A run that fails is told and left out.
+/// A file cannot be read or written (a full disk), or another process writes it; what was done until then is kept. A run that fails is
+/// told and left out.
 pub fn execute(gpu: &Gpu, prepared: &Prepared, options: Options<'_>, on: &mut dyn FnMut(Event<'_>)) -> Result<Outcome, SweepError> {
     fs::create_dir_all(options.out).map_err(|e| FileError::write(options.out, &e))?;
     let file = options.file();
-    let mut known = read_folder(options.out, on)?;
-    // Without damaged lines, so that the next record starts a line of its own.
-    rewrite(&file, prepared)?;
+    let _lock = lock(&file)?;
     let mut bench = Bench { gpu, prepared, out: options.out, cache: options.cache, references: HashMap::new() };
+    let mut inputs = HashMap::new();
+    for run in &prepared.runs {
+        inputs.insert(run.name.as_str(), bench.inputs(run)?);
+    }
+    let is_current = |record: &Record| record.sweep == prepared.sweep.name && inputs.get(record.run.as_str()) == Some(&record.inputs);
+    let mut known = newest(read_folder(options.out, on)?.into_iter().filter(is_current));
+    // Without damaged lines and with an end after the last, so that the next record starts a line of its own.
+    tidy(&file, prepared, &[])?;
     let (part, parts) = options.shard.unwrap_or((1, 1));
     let own = shard(prepared.runs.clone(), part, parts);
-    let mut todo = Vec::new();
-    for run in &own {
-        let inputs = bench.inputs(run)?;
-        if !known.iter().any(|r| r.run == run.name && r.inputs == inputs) {
-            todo.push((run, inputs));
-        }
-    }
+    let todo: Vec<&Run> = own.iter().filter(|run| !known.contains_key(&run.name)).collect();
     let mut outcome = Outcome { kept: own.len() - todo.len(), ..Outcome::default() };
     let (of, start) = (todo.len(), Instant::now());
-    for (index, (run, inputs)) in todo.into_iter().enumerate() {
+    for (index, run) in todo.into_iter().enumerate() {
         let left = (index > 0).then(|| start.elapsed().mul_f64((of - index) as f64 / index as f64));
         on(Event::Start { run, index, of, kept: outcome.kept, left });
-        match bench.run(run, inputs, &mut |done, of| on(Event::Reference { run, done, of })) {
+        match bench.run(run, inputs[run.name.as_str()].clone(), &mut |done, of| on(Event::Reference { run, done, of })) {
             Ok(record) => {
                 record::append(&file, &record)?;
                 on(Event::Done { record: &record, index, of });
-                known.retain(|old| old.run != record.run);
-                known.push(record);
+                known.insert(record.run.clone(), record);
             }
             Err(SweepError::File(fault)) => return Err(fault.into()),
             Err(fault) => {
@@ -108,9 +110,9 @@ pub fn execute(gpu: &Gpu, prepared: &Prepared, options: Options<'_>, on: &mut dy
             }
         }
     }
-    rewrite(&file, prepared)?;
-    outcome.records = in_order(known, &prepared.runs);
+    outcome.records = prepared.runs.iter().filter_map(|run| known.remove(&run.name)).collect();
     outcome.missing = prepared.runs.len() - outcome.records.len();
+    tidy(&file, prepared, if options.shard.is_none() { &outcome.records } else { &[] })?;
     Ok(outcome)
 }
 
@@ -118,48 +120,71 @@ pub fn execute(gpu: &Gpu, prepared: &Prepared, options: Options<'_>, on: &mut dy
 ///
 /// # Errors
 /// A file cannot be read.
-pub fn collect(folder: &Path, runs: &[Run], on: &mut dyn FnMut(Event<'_>)) -> Result<Vec<Record>, FileError> {
-    Ok(in_order(read_folder(folder, on)?, runs))
+pub fn collect(folder: &Path, sweep: &Sweep, on: &mut dyn FnMut(Event<'_>)) -> Result<Vec<Record>, FileError> {
+    let mut known = newest(read_folder(folder, on)?.into_iter().filter(|record| record.sweep == sweep.name));
+    Ok(sweep.runs().iter().filter_map(|run| known.remove(&run.name)).collect())
 }
 
-/// All records of all files of a folder, oldest file first by name.
+/// Keeps other processes from writing the same file; freed when it is dropped, also when the process is killed.
+fn lock(file: &Path) -> Result<fs::File, SweepError> {
+    let path = file.with_extension("lock");
+    let lock = fs::File::create(&path).map_err(|e| FileError::write(&path, &e))?;
+    match lock.try_lock() {
+        Err(fs::TryLockError::WouldBlock) => {
+            let text = format!("another process does a sweep in `{}`: wait for it, or do another part with --shard", file.display());
+            Err(SweepError::Render(text))
+        }
+        // A file system that knows no locks has to do without.
+        _ => Ok(lock),
+    }
+}
+
+/// All records of all files of a folder.
 fn read_folder(folder: &Path, on: &mut dyn FnMut(Event<'_>)) -> Result<Vec<Record>, FileError> {
     let entries = fs::read_dir(folder).map_err(|e| FileError::read(folder, e))?;
     let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    files.retain(|file| file.extension().is_some_and(|e| e == "jsonl"));
+    let holds_records = |file: &PathBuf| {
+        file.file_name().is_some_and(|n| n.to_string_lossy().starts_with("records")) && file.extension().is_some_and(|e| e == "jsonl")
+    };
+    files.retain(holds_records);
     files.sort();
     let mut all = Vec::new();
     for file in files {
-        let (records, damaged) = record::read(&file)?;
-        all.extend(records);
-        damaged.iter().for_each(|damage| on(Event::Damaged(damage)));
+        let lines = record::read(&file)?;
+        all.extend(lines.records);
+        lines.damaged.iter().for_each(|damage| on(Event::Damaged(damage)));
     }
     Ok(all)
 }
 
-/// One record a run, in the order of the sweep; the newest by date.
-fn in_order(records: Vec<Record>, runs: &[Run]) -> Vec<Record> {
+/// One record a run, by its name: the newest; of equally old ones, and where a clock was set back within a file, the later line.
+fn newest(records: impl Iterator<Item = Record>) -> HashMap<String, Record> {
     let mut newest: HashMap<String, Record> = HashMap::new();
     for record in records {
-        match newest.get(&record.run) {
-            Some(other) if other.date > record.date => {}
-            _ => {
-                newest.insert(record.run.clone(), record);
-            }
+        if newest.get(&record.run).is_none_or(|other| other.date <= record.date) {
+            newest.insert(record.run.clone(), record);
         }
     }
-    runs.iter().filter_map(|run| newest.remove(&run.name)).collect()
+    newest
 }
 
-/// Brings a file of records into the order of the sweep: damaged lines and records that a newer one of the same run replaced go, those of
-/// other sweeps stay, at the end.
-fn rewrite(file: &Path, prepared: &Prepared) -> Result<(), FileError> {
-    let (records, damaged) = record::read(file)?;
-    let others: Vec<Record> = records.iter().filter(|r| !prepared.runs.iter().any(|run| run.name == r.run)).cloned().collect();
-    let mut sorted = in_order(records.clone(), &prepared.runs);
-    sorted.extend(others);
-    if sorted == records && damaged.is_empty() {
+/// Brings a file of records into the order of the sweep, with `more` added: damaged lines and records that a later line of the same run
+/// replaced go, records of other sweeps and lines of other formats stay.
+fn tidy(file: &Path, prepared: &Prepared, more: &[Record]) -> Result<(), FileError> {
+    let lines = record::read(file)?;
+    let place: HashMap<&str, usize> = prepared.runs.iter().enumerate().map(|(place, run)| (run.name.as_str(), place)).collect();
+    let place = |record: &Record| (record.sweep == prepared.sweep.name).then(|| place.get(record.run.as_str()).copied()).flatten();
+    let mut own: BTreeMap<usize, Record> = BTreeMap::new();
+    let mut others = Vec::new();
+    for record in lines.records.iter().chain(more).cloned() {
+        match place(&record) {
+            Some(place) => drop(own.insert(place, record)),
+            None => others.push(record),
+        }
+    }
+    let sorted: Vec<Record> = own.into_values().chain(others).collect();
+    if sorted == lines.records && lines.damaged.is_empty() && lines.complete {
         return Ok(());
     }
-    record::write(file, &sorted)
+    record::write(file, &sorted, &lines.foreign)
 }

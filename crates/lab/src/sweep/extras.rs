@@ -6,11 +6,12 @@ use manylight_graph::{
     ron::{Kind, Reader, Shape, Tree, suggest},
 };
 
+use super::document;
 use crate::sheet::{Axis, Claim, Curve, Paper};
 
 const PAPER: Shape = Shape { what: "a paper's table", required: &["source", "unit", "rows"], optional: &[] };
 const CLAIM: Shape = Shape { what: "a claim", required: &["variant", "than"], optional: &["time", "error"] };
-const CURVE: Shape = Shape { what: "a curve", required: &["name", "scene", "metric", "points"], optional: &[] };
+const CURVE: Shape = Shape { what: "a curve", required: &["name", "scene", "size", "metric", "points"], optional: &[] };
 
 const LIGHT_KEY: Shape = Shape { what: "a place of the light", required: &["time", "position", "target"], optional: &[] };
 
@@ -101,7 +102,9 @@ fn curve(reader: &mut Reader, tree: &Tree) -> Option<Curve> {
     let text = |reader: &mut Reader, name: &str| fields.get(name).and_then(|t| reader.text(t, "a text in quotes")).map(|t| t.text);
     let (name, scene, metric) = (text(reader, "name"), text(reader, "scene"), text(reader, "metric"));
     let points = fields.get("points").map(|tree| reader.list(tree, "points").iter().filter_map(|tree| point(reader, tree)).collect());
-    Some(Curve { name: name?, scene: scene?, metric: metric?, points: points? })
+    let size = fields.get("size").and_then(|tree| document::read_size(reader, tree));
+    let (width, height) = size?;
+    Some(Curve { name: name?, scene: scene?, size: [width, height], metric: metric?, points: points? })
 }
 
 fn point(reader: &mut Reader, tree: &Tree) -> Option<(f64, f64)> {

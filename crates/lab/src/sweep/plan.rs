@@ -79,7 +79,7 @@ fn combinations(sweep: &Sweep, variant: &Variant) -> Vec<IndexMap<String, String
     all
 }
 
-/// Part `index` (from 1) of `count` of the runs: every `count`-th, so that parts cost about the same.
+/// Part `index` (from 1) of `count` of the runs: every `count`-th.
 pub fn shard(runs: Vec<Run>, index: usize, count: usize) -> Vec<Run> {
     runs.into_iter().enumerate().filter(|(i, _)| i % count == index - 1).map(|(_, run)| run).collect()
 }

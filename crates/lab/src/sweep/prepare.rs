@@ -1,7 +1,7 @@
 //! Everything that a sweep needs, loaded and checked before the first run.
 
 use std::{
-    collections::BTreeSet,
+    collections::{HashMap, hash_map::Entry},
     path::{Path, PathBuf},
 };
 
@@ -10,7 +10,7 @@ use manylight_graph::{
     diagnostics::{Diagnostic, Diagnostics},
     library::Library,
 };
-use manylight_passes::{Documents, SceneSource, Settings, load_registry, plan_input};
+use manylight_passes::{Documents, SceneSource, Settings, lights_left_out, load_registry, plan_input};
 use manylight_scene::Scene;
 
 use super::{
@@ -22,6 +22,9 @@ use super::{
     run::STANDARD_ERROR,
 };
 
+/// Faults of single runs are told until there are so many.
+const MOST_FAULTS: usize = 20;
+
 /// A sweep with its pipelines and scenes.
 #[derive(Debug)]
 pub struct Prepared {
@@ -29,10 +32,14 @@ pub struct Prepared {
     pub sweep: Sweep,
     /// Its runs.
     pub runs: Vec<Run>,
+    /// What was mended in scenes, and lights that a variant leaves out.
+    pub warnings: Diagnostics,
     /// By variant.
     pub(super) documents: Vec<Documents>,
     pub(super) scenes: Vec<LoadedScene>,
     pub(super) reference: Documents,
+    /// Those that are files, by scene and size.
+    references: HashMap<(usize, (u32, u32)), Reference>,
 }
 
 #[derive(Debug)]
@@ -57,6 +64,7 @@ pub fn prepare(sweep: Sweep, library: &Library, find: &SceneFinder<'_>) -> Resul
         let files = entry.reference.as_ref().map(|reference| (path(reference), entry.standard_error.as_ref().map(path)));
         match source.load() {
             Ok(mut scene) => {
+                out.extend(scene.warnings.clone());
                 if !sweep.light_path.is_empty()
                     && let Err(why) = scene.move_light(&sweep.light_path)
                 {
@@ -72,9 +80,10 @@ pub fn prepare(sweep: Sweep, library: &Library, find: &SceneFinder<'_>) -> Resul
     }
     let open = |name: &Path| Documents::with(library.clone(), registry.clone(), faults.clone(), name);
     let documents = sweep.variants.iter().map(|v| open(&sweep.beside(&v.pipeline.text))).collect::<Result<Vec<_>, _>>()?;
-    let prepared = Prepared { runs: sweep.runs(), documents, scenes, reference: open(Path::new(REFERENCE))?, sweep };
-    prepared.plan_all()?;
-    prepared.check_reference_files()?;
+    let (runs, reference) = (sweep.runs(), open(Path::new(REFERENCE))?);
+    let mut prepared = Prepared { sweep, runs, warnings: out, documents, scenes, reference, references: HashMap::new() };
+    prepared.warnings.extend(prepared.plan_all()?);
+    prepared.read_references()?;
     Ok(prepared)
 }
 
@@ -96,42 +105,50 @@ impl Prepared {
         Task { documents: &self.reference, source, scene, size: run.size, what: &self.sweep.reference, time }
     }
 
-    fn plan_all(&self) -> Result<(), SweepError> {
-        let mut faults = Diagnostics::default();
+    /// Plans every run; returns what is worth a warning.
+    fn plan_all(&self) -> Result<Diagnostics, SweepError> {
+        let (mut faults, mut warnings) = (Diagnostics::default(), Diagnostics::default());
         for run in &self.runs {
-            let input = plan_input(&self.settings(run), &self.scenes[run.scene].scene);
-            match self.documents[run.variant].plan(&input) {
+            let scene = &self.scenes[run.scene].scene;
+            match self.documents[run.variant].plan(&plan_input(&self.settings(run), scene)) {
                 Ok(plan) => {
-                    let absent = |name: &&String| plan.resource(name).is_none();
-                    if let Some(name) = self.settings(run).keep.iter().find(absent) {
-                        let fault = Diagnostic::error(
-                            format!("no node writes `{name}` in the run `{}`", run.name),
-                            self.sweep.image_of(run.variant).span.clone(),
-                        );
+                    let wanted =
+                        std::iter::once(self.sweep.image_of(run.variant)).chain(self.sweep.mask.as_ref().map(|mask| &mask.resource));
+                    for name in wanted.filter(|name| plan.resource(&name.text).is_none()) {
+                        let fault =
+                            Diagnostic::error(format!("no node writes `{}` in the run `{}`", name.text, run.name), name.span.clone());
                         faults.push(fault.help("its conditions switch all nodes off that would: change the variant's settings"));
+                    }
+                    if let Some(warning) = lights_left_out(scene, &plan)
+                        && !warnings.0.contains(&warning)
+                    {
+                        warnings.push(warning);
                     }
                 }
                 Err(own) => {
                     faults.push(Diagnostic::error_nowhere(format!("the run `{}` cannot be planned", run.name)));
                     faults.extend(own);
-                    break;
                 }
             }
+            if faults.0.len() > MOST_FAULTS {
+                break;
+            }
         }
-        if faults.is_empty() { Ok(()) } else { Err(faults.into()) }
+        if faults.is_empty() { Ok(warnings) } else { Err(faults.into()) }
     }
 
-    fn check_reference_files(&self) -> Result<(), SweepError> {
-        let mut seen = BTreeSet::new();
-        for run in self.runs.iter().filter(|run| seen.insert((run.scene, run.size))) {
-            self.reference_file(run).transpose()?;
+    fn read_references(&mut self) -> Result<(), SweepError> {
+        for run in &self.runs {
+            let Some((file, standard_error)) = &self.scenes[run.scene].files else { continue };
+            if let Entry::Vacant(entry) = self.references.entry((run.scene, run.size)) {
+                entry.insert(reference::from_file(file, standard_error.as_deref(), run.size)?);
+            }
         }
         Ok(())
     }
 
     /// The reference that a file holds, if the scene names one.
-    pub(super) fn reference_file(&self, run: &Run) -> Option<Result<Reference, SweepError>> {
-        let (file, standard_error) = self.scenes[run.scene].files.as_ref()?;
-        Some(reference::from_file(file, standard_error.as_deref(), run.size))
+    pub(super) fn reference_file(&self, run: &Run) -> Option<&Reference> {
+        self.references.get(&(run.scene, run.size))
     }
 }

@@ -75,7 +75,10 @@ impl Task<'_> {
     pub fn hash(&self) -> Result<String, SweepError> {
         let (frames, _) = self.batches();
         let time = self.time;
-        Ok(facts::hash(&[&facts::fingerprint(&self.plan()?), &format!("{:016x} {frames} {time:?} {SEED}", self.scene.hash)]))
+        Ok(facts::hash(&[
+            &facts::fingerprint(&self.plan()?),
+            &format!("{:016x} {frames} {time:?} {SEED} {}", self.scene.hash, env!("CARGO_PKG_VERSION")),
+        ]))
     }
 
     /// From the cache, or rendered and put there. `progress` is told the batches that are done and all of them.
@@ -126,15 +129,25 @@ pub(super) fn rgb(image: Image) -> Picture {
 /// Reads a reference from files.
 pub(super) fn from_file(file: &Path, standard_error: Option<&Path>, size: (u32, u32)) -> Result<Reference, SweepError> {
     let picture = colours(file, size)?;
+    let bytes = |file: &Path| fs::read(file).map_err(|e| FileError::read(file, e));
+    let hash = facts::hash(&[&bytes(file)?, &standard_error.map(bytes).transpose()?.unwrap_or_default()]);
+    // manylight's own have the number of batches in alpha.
+    let batches = standard_error.map(read_exr).transpose()?.and_then(|error| error.layer("")).and_then(|error| batches_of(&error));
     let standard_error = standard_error.map(|file| colours(file, size)).transpose()?;
-    let bytes = fs::read(file).map_err(|e| FileError::read(file, e))?;
     let facts = ReferenceFacts {
         name: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        hash: facts::hash(&[&bytes]),
+        hash,
         paths: None,
         relative_standard_error: standard_error.as_ref().and_then(|error| relative(&picture, error)),
     };
-    Ok(Reference { picture, standard_error, batches: None, facts })
+    Ok(Reference { picture, standard_error, batches, facts })
+}
+
+/// The largest value of alpha, if there is one: the number of batches of a standard error.
+pub(super) fn batches_of(error: &Picture) -> Option<u32> {
+    let alpha = error.names.iter().position(|name| name == "A")?;
+    let most = error.data.iter().skip(alpha).step_by(error.channels()).fold(0.0_f32, |most, n| most.max(*n));
+    Some(most as u32)
 }
 
 fn colours(file: &Path, size: (u32, u32)) -> Result<Picture, FileError> {

@@ -11,7 +11,7 @@ use super::{
     document::MaskUse,
     plan::Run,
     prepare::Prepared,
-    reference::{Reference, rgb},
+    reference::{Reference, batches_of, rgb},
 };
 use crate::{
     facts,
@@ -46,7 +46,7 @@ impl Bench<'_> {
         let scene = &self.prepared.scenes[run.scene].scene;
         let plan = self.prepared.documents[run.variant].plan(&plan_input(&self.prepared.settings(run), scene))?;
         let reference = match self.prepared.reference_file(run) {
-            Some(reference) => reference?.facts.hash,
+            Some(reference) => reference.facts.hash.clone(),
             None => self.prepared.task(run, self.time(sweep.frames_of(run.variant) - 1)).hash()?,
         };
         let asked = format!(
@@ -74,7 +74,7 @@ impl Bench<'_> {
     /// The reference of a run at a frame.
     fn reference(&mut self, run: &Run, frame: u32, progress: &mut dyn FnMut(u32, u32)) -> Result<Reference, SweepError> {
         if let Some(reference) = self.prepared.reference_file(run) {
-            return reference;
+            return Ok(reference.clone());
         }
         let task = self.prepared.task(run, self.time(frame));
         let hash = task.hash()?;
@@ -101,13 +101,24 @@ impl Bench<'_> {
         let image = self.image(run, &renderer)?;
         let mask = self.mask(&renderer)?;
         let compared = compare(&image, &reference, mask.as_ref())?;
+        let counted = compared.counted() as u64;
         let not_finite = (compared.non_finite_image + compared.non_finite_reference) as u64;
         let mut errors = compared.named();
         errors.extend(passing(&renderer, &image, &reference, mask.as_ref())?.map(|share| ("z_passing".to_owned(), share)));
         let pictures = self.write_pictures(&inputs, &image, &reference, mask.as_ref())?;
-        let sequence = self.sequence(run, &mut renderer, &mut errors, progress)?;
+        let sequence = self.sequence(run, &mut renderer, mask.as_ref(), &mut errors, progress)?;
         let (samples, serial) = self.measure(run, &mut renderer)?;
-        let median = samples.wall.median().unwrap_or(0.0);
+        let wall = Summary::of(&samples.wall).unwrap_or(Summary { median: 0.0, p95: 0.0, samples: 0 });
+        let mut times = Times {
+            method: if serial { "serial" } else { "timestamps" }.to_owned(),
+            software: self.gpu.kind() == GpuKind::Software,
+            wall,
+            gpu: Summary::of(&samples.gpu),
+            cpu: Summary::of(&samples.cpu),
+            until_picture: 0.0,
+            nodes: node_times(&samples),
+        };
+        times.until_picture = times.frame() * f64::from(frames);
         let plan = renderer.plan();
         Ok(Record {
             format: FORMAT,
@@ -129,6 +140,8 @@ impl Bench<'_> {
             measured: sweep.measure,
             time: sweep.time,
             fps: sweep.fps,
+            light_path: sweep.light_path.iter().map(|(time, position, target)| (*time, position.to_array(), target.to_array())).collect(),
+            sequence_frames: sweep.sequence.map(|sequence| [sequence.frames, sequence.every]),
             seed: run.seed,
             image: sweep.image_of(run.variant).text.clone(),
             reference: reference.facts,
@@ -136,17 +149,10 @@ impl Bench<'_> {
             adapter: facts::adapter(self.gpu),
             manylight: env!("CARGO_PKG_VERSION").to_owned(),
             date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
-            times: Times {
-                method: if serial { "serial" } else { "timestamps" }.to_owned(),
-                software: self.gpu.kind() == GpuKind::Software,
-                wall: Summary::of(&samples.wall).unwrap_or(Summary { median, p95: median, samples: 0 }),
-                gpu: Summary::of(&samples.gpu),
-                cpu: Summary::of(&samples.cpu),
-                until_picture: median * f64::from(frames),
-                nodes: node_times(&samples),
-            },
+            times,
             memory: renderer.memory_report().total(),
             metrics: errors,
+            counted,
             not_finite,
             sequence,
             pictures,
@@ -176,6 +182,7 @@ impl Bench<'_> {
         &mut self,
         run: &Run,
         renderer: &mut Renderer,
+        mask: Option<&Mask>,
         errors: &mut IndexMap<String, f64>,
         progress: &mut dyn FnMut(u32, u32),
     ) -> Result<Vec<FrameError>, SweepError> {
@@ -195,7 +202,7 @@ impl Bench<'_> {
         };
         let mut fault = None;
         let frames = (0..sequence.frames).map_while(|index| step(index).map_err(|e| fault = Some(e)).ok());
-        let flicker = metrics::flicker(frames, None)?;
+        let flicker = metrics::flicker(frames, mask)?;
         if let Some(fault) = fault {
             return Err(fault);
         }
@@ -256,11 +263,11 @@ fn compare(image: &Picture, reference: &Reference, mask: Option<&Mask>) -> Resul
 fn passing(renderer: &Renderer, image: &Picture, reference: &Reference, mask: Option<&Mask>) -> Result<Option<f64>, SweepError> {
     let Some(reference_error) = &reference.standard_error else { return Ok(None) };
     let Ok(error) = renderer.read(STANDARD_ERROR) else { return Ok(None) };
-    let batches = error.data.iter().skip(3).step_by(4).fold(0.0_f32, |most, n| most.max(*n)) as u32;
-    if batches < 2 {
-        return Ok(None);
-    }
-    let ours = Estimate { picture: image, standard_error: Some(&rgb(error)), batches: Some(batches) };
+    let error = Picture::linear(error.width as usize, error.height as usize, error.channels as usize, error.data);
+    // One frame has no spread.
+    let Some(batches) = batches_of(&error).filter(|batches| *batches > 1) else { return Ok(None) };
+    let error = error.without_alpha();
+    let ours = Estimate { picture: image, standard_error: Some(&error), batches: Some(batches) };
     let theirs = Estimate { picture: &reference.picture, standard_error: Some(reference_error), batches: reference.batches };
     Ok(Some(metrics::z_test(ours, theirs, mask)?.passing))
 }

@@ -11,7 +11,7 @@ use indicatif::ProgressBar;
 use manylight::{
     fault::Fault,
     files::write_text,
-    graph::library::Library,
+    graph::{Spanned, diagnostics::Span, library::Library},
     lab::{
         metrics::Known,
         record::Record,
@@ -38,7 +38,17 @@ pub fn cache(given: Option<&PathBuf>, name: &str) -> Result<PathBuf, Fault> {
 
 /// Loads everything that a sweep names.
 pub fn load(sweep: Sweep, library: &Library) -> Result<Prepared, Fault> {
-    prepare(sweep, library, &|name| library::scene(library, name).map_err(|fault| fault.to_string())).map_err(of_sweep)
+    let prepared = prepare(sweep, library, &|name| library::scene(library, name).map_err(|fault| fault.to_string())).map_err(of_sweep)?;
+    super::warn(&prepared.warnings);
+    Ok(prepared)
+}
+
+/// A path of the command line: from the current folder, not from the sweep's.
+pub fn given(sweep: &Sweep, name: &str) -> Spanned {
+    let path = Path::new(name);
+    let text =
+        path.is_file().then(|| path.canonicalize().ok()).flatten().map_or_else(|| name.to_owned(), |p| p.to_string_lossy().into_owned());
+    Spanned { text, span: Span::new(&sweep.source, 0..0) }
 }
 
 /// Does the runs and tells what happens.

@@ -7,13 +7,14 @@ use manylight::{
     fault::Fault,
     gpu::Gpu,
     graph::{
-        diagnostics::{Diagnostic, Diagnostics, Severity},
         pipeline::Pipeline,
         plan::{Debug, Plan, PlanInput},
     },
-    library, plan_input,
+    library,
+    passes::lights_left_out,
+    plan_input,
     renderer::{RenderError, Renderer},
-    scene::{LightShape, Scene},
+    scene::Scene,
 };
 
 use crate::cli::{Cli, DebugArgs, FrameArgs, PipelineArgs};
@@ -67,7 +68,9 @@ impl Session {
     /// Binds everything to a device.
     pub fn renderer(self, gpu: &Gpu, scene: LoadedScene, settings: Settings) -> Result<Renderer, Fault> {
         let renderer = Renderer::with(gpu, self.documents, scene.source, scene.scene, settings).map_err(of_render)?;
-        warn_of_lights(renderer.scene(), renderer.plan());
+        if let Some(warning) = lights_left_out(renderer.scene(), renderer.plan()) {
+            super::warn(&warning.into());
+        }
         Ok(renderer)
     }
 }
@@ -91,26 +94,5 @@ pub fn of_render(error: RenderError) -> Fault {
     match error {
         RenderError::Documents(diagnostics) => Fault::Documents(diagnostics),
         RenderError::Run(error) => Fault::Input(error.to_string()),
-    }
-}
-
-/// Says which lights are not rendered by a pipeline that reads the first spot light only.
-fn warn_of_lights(scene: &Scene, plan: &Plan) {
-    if plan.resource("scene_light").is_none() || plan.resource("scene_lights").is_some() {
-        return;
-    }
-    let count = |of: fn(&LightShape) -> bool| scene.lights.iter().filter(|light| of(&light.shape)).count();
-    let spots = count(|shape| matches!(shape, LightShape::Spot { .. }));
-    let dark = [
-        (spots.saturating_sub(1), "spot"),
-        (count(|shape| *shape == LightShape::Point), "point"),
-        (count(|shape| *shape == LightShape::Directional), "directional"),
-    ];
-    let dark: Vec<String> = dark.iter().filter(|(count, _)| *count > 0).map(|(count, kind)| format!("{count} {kind}")).collect();
-    if !dark.is_empty() {
-        let rendered = if spots > 0 { "the first spot light" } else { "a spot light, which the scene does not have" };
-        let message = format!("this pipeline renders only {rendered}; lights not rendered: {}", dark.join(", "));
-        let warning = Diagnostic { severity: Severity::Warning, ..Diagnostic::error_nowhere(message) };
-        super::warn(&Diagnostics(vec![warning.help("the pipeline `reference` renders all lights")]));
     }
 }

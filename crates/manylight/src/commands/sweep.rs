@@ -5,15 +5,11 @@ use std::{fs, path::PathBuf};
 use manylight::{
     fault::Fault,
     files::{FileError, write_text},
-    graph::{
-        Spanned,
-        diagnostics::{Severity, Span},
-        library::Library,
-    },
+    graph::{diagnostics::Severity, library::Library},
     lab::{
         record::Record,
         report,
-        sweep::{Event, Outcome, SceneUse, Sweep, collect},
+        sweep::{Event, Outcome, SceneUse, Sweep, collect, shard},
     },
     library,
 };
@@ -30,7 +26,9 @@ pub fn run(cli: &Cli, args: &SweepArgs) -> Result<(), Fault> {
     }
     let prepared = lab::load(sweep, &library)?;
     if args.list {
-        let lines: String = prepared.runs.iter().map(|run| format!("{}\n", run.name)).collect();
+        let (part, parts) = args.shard.unwrap_or((1, 1));
+        let runs = shard(prepared.runs, part, parts);
+        let lines: String = runs.iter().map(|run| format!("{}\n", run.name)).collect();
         return super::print(&lines);
     }
     let Outcome { records, kept, failed, missing } = lab::run(&prepared, &args.out, args.shard, &args.lab)?;
@@ -50,7 +48,6 @@ pub fn run(cli: &Cli, args: &SweepArgs) -> Result<(), Fault> {
 /// The sweep with what the command line changes of it.
 fn read(library: &Library, args: &SweepArgs) -> Result<Sweep, Fault> {
     let mut sweep = Sweep::read(&library::sweep(library, &args.sweep)?, args.lab.small)?;
-    let given = |text: String| Spanned { text, span: Span::new(&sweep.source, 0..0) };
     if args.reference.is_some() && args.scene.len() != 1 {
         return Err(Fault::Usage("--reference is the reference of one scene: give --scene once".to_owned()));
     }
@@ -58,9 +55,9 @@ fn read(library: &Library, args: &SweepArgs) -> Result<Sweep, Fault> {
     for scene in &args.scene {
         // Told here if it is not there: the sweep's document is not at fault.
         library::scene(library, scene)?;
-        let path = |file: &PathBuf| given(file.to_string_lossy().into_owned());
+        let path = |file: &PathBuf| lab::given(&sweep, &file.to_string_lossy());
         let (reference, standard_error) = (args.reference.as_ref().map(path), args.standard_error.as_ref().map(path));
-        scenes.push(SceneUse { scene: given(scene.clone()), reference, standard_error });
+        scenes.push(SceneUse { scene: lab::given(&sweep, scene), reference, standard_error });
     }
     if !scenes.is_empty() {
         sweep.scenes = scenes;
@@ -79,7 +76,7 @@ fn report_only(library: &Library, sweep: &Sweep, args: &SweepArgs) -> Result<(),
         return Err(faults.into());
     }
     let runs = sweep.runs();
-    let records = collect(&args.out, &runs, &mut |event| {
+    let records = collect(&args.out, sweep, &mut |event| {
         if let Event::Damaged(damage) = event {
             note(&damage.to_string());
         }

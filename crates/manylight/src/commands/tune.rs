@@ -5,7 +5,6 @@ use std::path::Path;
 use manylight::{
     fault::Fault,
     files::{check_writable, write_text},
-    graph::{Spanned, diagnostics::Span},
     lab::{
         metrics::Known,
         sweep::{SceneUse, Sweep},
@@ -20,6 +19,9 @@ use crate::cli::{Cli, TuneArgs};
 /// Runs the sweep on the scene, chooses, and writes the preset.
 pub fn run(cli: &Cli, args: &TuneArgs) -> Result<(), Fault> {
     check_writable(&args.out).map_err(of_file)?;
+    if args.out.file_name().is_some_and(|file| file == extended(&args.pipeline).as_str()) {
+        return Err(Fault::Usage(format!("the preset would extend itself: give `{}` another name", args.out.display())));
+    }
     let goal = match (args.budget, args.error) {
         (Some(budget), _) => Goal::Budget(budget),
         (None, Some(error)) => Goal::Error(error),
@@ -28,11 +30,19 @@ pub fn run(cli: &Cli, args: &TuneArgs) -> Result<(), Fault> {
     let library = library::open(cli.root.as_deref())?;
     library::scene(&library, &args.scene)?;
     let mut sweep = Sweep::read(&library::sweep(&library, &args.sweep)?, args.lab.small)?;
-    let scene = Spanned { text: args.scene.clone(), span: Span::new(&sweep.source, 0..0) };
-    sweep.scenes = vec![SceneUse { scene, reference: None, standard_error: None }];
+    sweep.scenes = vec![SceneUse { scene: lab::given(&sweep, &args.scene), reference: None, standard_error: None }];
     if let Some(size) = args.lab.size {
         sweep.sizes = vec![size];
     }
+    if sweep.sizes.len() > 1 {
+        return Err(Fault::Usage(format!(
+            "the sweep `{}` has several sizes, whose times do not compare: choose one with --size",
+            sweep.name
+        )));
+    }
+    // Settings compete, not seeds; what is claimed of variants is not asked here.
+    sweep.seeds.truncate(1);
+    sweep.claims.clear();
     sweep.variants.retain(|variant| name(&variant.pipeline.text) == name(&args.pipeline));
     if sweep.variants.is_empty() {
         let text = format!("the sweep `{}` has no variant of the pipeline `{}`; name another with --sweep", sweep.name, args.pipeline);
@@ -50,7 +60,8 @@ pub fn run(cli: &Cli, args: &TuneArgs) -> Result<(), Fault> {
     let adapter = record.adapter["name"].as_str().unwrap_or("unknown adapter").to_owned();
     let doc = format!("Tuned for {}: {found} at {}x{} on {adapter}.", record.scene.name, record.size[0], record.size[1]);
     write_text(&args.out, &preset(record, &extended(&args.pipeline), &doc)).map_err(of_file)?;
-    note(&format!("{} runs were tried: {}", outcome.records.len(), report.display()));
+    let failed = if outcome.failed > 0 { format!(", {} more failed", outcome.failed) } else { String::new() };
+    note(&format!("{} runs were tried{failed}: {}", outcome.records.len(), report.display()));
     super::print(&format!("{}: {found}\n{}\n", record.run, args.out.display()))
 }
 

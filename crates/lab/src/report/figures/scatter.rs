@@ -64,7 +64,7 @@ fn measured(study: &Study<'_>, group: &Group<'_>, shown: &[usize]) -> Vec<Series
 /// Curves of other renderers for this scene; those of another metric and points that are not finite are noted.
 fn curves(study: &Study<'_>, group: &Group<'_>, notes: &mut Vec<String>) -> Vec<Series> {
     let mut series = Vec::new();
-    for (index, curve) in study.sheet.curves.iter().enumerate().filter(|(_, c)| c.scene == group.scene) {
+    for (index, curve) in study.sheet.curves.iter().enumerate().filter(|(_, c)| c.scene == group.scene && c.size == group.size) {
         if curve.metric != study.sheet.metric {
             notes.push(format!("The curve `{}` is left out, it is of the metric `{}`.", curve.name, curve.metric));
             continue;
