@@ -2,7 +2,8 @@
 // Tile t is lit by the clusters c with c mod n² = t, times n². Eq. 5.5's intensity omits the light's flux: here it is included (methods: radiometry).
 // Differs from the papers: taps are compared with the receiver's tangent plane, the bias is a share of the distance.
 // What bounds it: k / n² lights per pixel, with each 32 reads of the atlas (pcss) or a ray through some tens of nodes (exact: on a software
-// adapter twice the time of pcss in a box of some tens of triangles, seven times in an atrium of 66,000).
+// adapter twice the time of pcss in a box of some tens of triangles, seven times in an atrium of 66,000). Mesa's software adapters end all loops of
+// an invocation after 65,535 rounds together, in silence: with exact visibility k / n² must stay below some 2000 there.
 
 #import common::bvh::{RAY_OFFSET, visible}
 #import common::cluster::{Cluster, CLUSTER_ACTIVE}

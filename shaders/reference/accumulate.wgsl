@@ -54,7 +54,11 @@ fn accumulate(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= textureDimensions(sum)) {
         return;
     }
-    let value = textureLoad(traced, id.xy, 0).rgb;
+    var paths: vec4f;
+    for (var i = 0u; i < 4u; i++) {
+        paths[i] = textureLoad(traced, vec2u(4u * id.x + i, id.y), 0).x;
+    }
+    let value = paths.rgb / max(paths.a, 1.0);
     var total = vec4f(value, 1.0);
     var spread = vec3f(0.0);
     if frame.index > 0u && key_previous[0] == key[0] {

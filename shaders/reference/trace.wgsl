@@ -28,7 +28,7 @@ struct Params {
 @group(0) @binding(8) var scene_textures: texture_2d_array<f32>;
 @group(0) @binding(9) var linear_repeat_sampler: sampler;
 @group(0) @binding(12) var<uniform> params: Params;
-@group(0) @binding(13) var traced: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(13) var traced: texture_storage_2d<r32float, read_write>;
 
 override component_is_direct: bool;
 override component_is_full: bool;
@@ -295,17 +295,35 @@ fn path(pixel: vec2u, size: vec2u) -> vec3f {
     return radiance;
 }
 
+// Paths of one dispatch (the declaration divides by it). Some adapters end all loops of an invocation after 65,535 rounds together, in silence
+// (Mesa's software rasterizer): four paths of many bounces through a deep hierarchy stay below.
+const PATHS_AT_ONCE: u32 = 4u;
+
+@compute @workgroup_size(8, 8)
+fn clear(@builtin(global_invocation_id) id: vec3u) {
+    if all(id.xy < textureDimensions(traced)) {
+        textureStore(traced, id.xy, vec4f(0.0));
+    }
+}
+
 @compute @workgroup_size(8, 8)
 fn trace(@builtin(global_invocation_id) id: vec3u) {
-    let size = textureDimensions(traced);
+    let size = textureDimensions(traced) / vec2u(4u, 1u);
     if any(id.xy >= size) {
         return;
     }
-    pixel_seed = hash3(id.x + id.y * size.x, frame.index, frame.seed);
-    random_state = pixel_seed;
-    var sum = vec3f(0.0);
-    for (path_index = 0u; path_index < params.paths; path_index++) {
-        sum += path(id.xy, size);
+    let pixel = id.x + id.y * size.x;
+    var sum: vec4f;
+    for (var i = 0u; i < 4u; i++) {
+        sum[i] = textureLoad(traced, vec2u(4u * id.x + i, id.y)).x;
     }
-    textureStore(traced, id.xy, vec4f(sum / f32(params.paths), 1.0));
+    pixel_seed = hash3(pixel, frame.index, frame.seed);
+    let first = u32(sum.a);
+    random_state = hash3(pixel_seed, first, 0u);
+    for (path_index = first; path_index < min(first + PATHS_AT_ONCE, params.paths); path_index++) {
+        sum += vec4f(path(id.xy, size), 1.0);
+    }
+    for (var i = 0u; i < 4u; i++) {
+        textureStore(traced, vec2u(4u * id.x + i, id.y), vec4f(sum[i]));
+    }
 }

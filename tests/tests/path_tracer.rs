@@ -102,3 +102,18 @@ fn two_per_cent_too_much_energy_is_found() {
     let ratio = test(&of(ONE_BOUNCE), 1.02).ratio.expect("not black");
     assert!((ratio.value - 1.0).abs() > 0.005 && ratio.value - 1.0 > 5.0 * ratio.standard_error, "{ratio:?}");
 }
+
+/// Many paths in one frame are as many in several: some adapters end loops that run long, in silence, so no dispatch may do them all.
+#[test]
+fn all_paths_of_a_frame_are_traced() {
+    let mean = |paths: u32, frames: u32| {
+        let job = Job { pipeline: root().join("pipelines/reference.ron").to_string_lossy().into_owned(), ..Job::asset("glossy") };
+        let job = Job { size: (16, 16), ..job }.set("component", "full").set("paths", paths).frames(frames);
+        let image = read(&job.render(), "composed");
+        let rgb = image.data.chunks_exact(4).flat_map(|pixel| &pixel[..3]);
+        rgb.map(|v| f64::from(*v)).sum::<f64>() / f64::from(3 * 16 * 16)
+    };
+    let (one, several) = (mean(256, 1), mean(16, 16));
+    println!("{one:.5} in one frame, {several:.5} in sixteen");
+    assert!((one / several - 1.0).abs() < 0.03, "{one} in one frame, {several} in sixteen");
+}
