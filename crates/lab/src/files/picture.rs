@@ -1,5 +1,7 @@
 //! A picture in memory: named channels of 32-bit floats.
 
+use manylight_gpu::Image;
+
 /// What the numbers of a picture mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tone {
@@ -80,6 +82,13 @@ impl Picture {
         let all = self.names.len();
         let data = self.data.chunks_exact(all).flat_map(|pixel| channels.iter().map(|(i, _)| pixel[*i])).collect();
         Self { width: self.width, height: self.height, names: channels.iter().map(|(_, n)| n.clone()).collect(), data, tone: self.tone }
+    }
+}
+
+impl From<Image> for Picture {
+    /// What was read from the GPU, under the usual names of its channels.
+    fn from(image: Image) -> Self {
+        Self::linear(image.width as usize, image.height as usize, image.channels as usize, image.data)
     }
 }
 

@@ -123,7 +123,7 @@ impl Task<'_> {
 
 /// A texture's red, green and blue.
 pub(super) fn rgb(image: Image) -> Picture {
-    Picture::linear(image.width as usize, image.height as usize, image.channels as usize, image.data).without_alpha()
+    Picture::from(image).without_alpha()
 }
 
 /// Reads a reference from files.

@@ -263,7 +263,7 @@ fn compare(image: &Picture, reference: &Reference, mask: Option<&Mask>) -> Resul
 fn passing(renderer: &Renderer, image: &Picture, reference: &Reference, mask: Option<&Mask>) -> Result<Option<f64>, SweepError> {
     let Some(reference_error) = &reference.standard_error else { return Ok(None) };
     let Ok(error) = renderer.read(STANDARD_ERROR) else { return Ok(None) };
-    let error = Picture::linear(error.width as usize, error.height as usize, error.channels as usize, error.data);
+    let error = Picture::from(error);
     // One frame has no spread.
     let Some(batches) = batches_of(&error).filter(|batches| *batches > 1) else { return Ok(None) };
     let error = error.without_alpha();

@@ -18,6 +18,7 @@ use manylight::{
     library, load_registry,
 };
 
+use super::lab;
 use crate::cli::{CheckArgs, Cli};
 
 /// Checks the files, or everything in the library.
@@ -115,9 +116,7 @@ impl Checker {
         };
         for small in [false, true] {
             let faults = match Sweep::read(&source, small) {
-                Ok(sweep) => sweep.check(&loaded.library, &loaded.registry, &|scene| {
-                    library::scene(&loaded.library, scene).map_err(|fault| fault.to_string())
-                }),
+                Ok(sweep) => sweep.check(&loaded.library, &loaded.registry, &lab::find_scene(&loaded.library)),
                 Err(faults) => faults,
             };
             for fault in faults.0 {

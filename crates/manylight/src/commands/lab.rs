@@ -9,6 +9,7 @@ use std::{
 use etcetera::BaseStrategy;
 use indicatif::ProgressBar;
 use manylight::{
+    SceneSource,
     fault::Fault,
     files::write_text,
     graph::{Spanned, diagnostics::Span, library::Library},
@@ -36,9 +37,23 @@ pub fn cache(given: Option<&PathBuf>, name: &str) -> Result<PathBuf, Fault> {
         .map_err(|e| Fault::Input(format!("there is no cache folder ({e}); name one with --cache or --records")))
 }
 
+/// The sweep of that name, in the size and for the pictures that the command line asks for.
+pub fn read(library: &Library, name: &str, args: &LabArgs) -> Result<Sweep, Fault> {
+    let mut sweep = Sweep::read(&library::sweep(library, name)?, args.small)?;
+    if let Some(size) = args.size {
+        sweep.sizes = vec![size];
+    }
+    Ok(sweep)
+}
+
+/// Finds the scenes that sweeps name as the command line does.
+pub fn find_scene(library: &Library) -> impl Fn(&str) -> Result<SceneSource, String> + '_ {
+    |name| library::scene(library, name).map_err(|fault| fault.to_string())
+}
+
 /// Loads everything that a sweep names.
 pub fn load(sweep: Sweep, library: &Library) -> Result<Prepared, Fault> {
-    let prepared = prepare(sweep, library, &|name| library::scene(library, name).map_err(|fault| fault.to_string())).map_err(of_sweep)?;
+    let prepared = prepare(sweep, library, &find_scene(library)).map_err(of_sweep)?;
     super::warn(&prepared.warnings);
     Ok(prepared)
 }

@@ -96,7 +96,7 @@ impl Outputs {
         match (FileKind::of(file).map_err(of_file)?, plan.radiance) {
             (FileKind::Exr, Some(radiance)) => {
                 let image = read(renderer, &plan.resources[radiance].name)?;
-                write_exr(file, &picture(image).without_alpha()).map_err(of_file)
+                write_exr(file, &Picture::from(image).without_alpha()).map_err(of_file)
             }
             _ => {
                 let shown = &plan.resources[plan.presents];
@@ -129,7 +129,7 @@ fn write_dump(renderer: &Renderer, name: &str, file: &Path) -> Result<(), Fault>
             };
             write_text(file, &format!("{value:#}\n")).map_err(of_file)
         }
-        FileKind::Exr => write_exr(file, &picture(read(renderer, name)?)).map_err(of_file),
+        FileKind::Exr => write_exr(file, &read(renderer, name)?.into()).map_err(of_file),
         FileKind::Png => write_as_png(file, &read(renderer, name)?, desc),
     }
 }
@@ -143,10 +143,6 @@ fn texels(image: &Image) -> Value {
 /// Reads a texture of the latest frame.
 pub fn read(renderer: &Renderer, name: &str) -> Result<Image, Fault> {
     renderer.read(name).map_err(|e| Fault::Input(e.to_string()))
-}
-
-fn picture(image: Image) -> Picture {
-    Picture::linear(image.width as usize, image.height as usize, image.channels as usize, image.data)
 }
 
 fn write_as_png(file: &Path, image: &Image, desc: &ResourceDesc) -> Result<(), Fault> {

@@ -5,7 +5,7 @@ use std::{fs, path::PathBuf};
 use manylight::{
     fault::Fault,
     files::{FileError, write_text},
-    graph::{diagnostics::Severity, library::Library},
+    graph::library::Library,
     lab::{
         record::Record,
         report,
@@ -47,7 +47,7 @@ pub fn run(cli: &Cli, args: &SweepArgs) -> Result<(), Fault> {
 
 /// The sweep with what the command line changes of it.
 fn read(library: &Library, args: &SweepArgs) -> Result<Sweep, Fault> {
-    let mut sweep = Sweep::read(&library::sweep(library, &args.sweep)?, args.lab.small)?;
+    let mut sweep = lab::read(library, &args.sweep, &args.lab)?;
     if args.reference.is_some() && args.scene.len() != 1 {
         return Err(Fault::Usage("--reference is the reference of one scene: give --scene once".to_owned()));
     }
@@ -62,17 +62,14 @@ fn read(library: &Library, args: &SweepArgs) -> Result<Sweep, Fault> {
     if !scenes.is_empty() {
         sweep.scenes = scenes;
     }
-    if let Some(size) = args.lab.size {
-        sweep.sizes = vec![size];
-    }
     Ok(sweep)
 }
 
 /// Table and report of the records that are there.
 fn report_only(library: &Library, sweep: &Sweep, args: &SweepArgs) -> Result<(), Fault> {
     let (registry, _) = manylight::load_registry(library);
-    let faults = sweep.check(library, &registry, &|scene| library::scene(library, scene).map_err(|fault| fault.to_string()));
-    if faults.0.iter().any(|fault| fault.severity == Severity::Error) {
+    let faults = sweep.check(library, &registry, &lab::find_scene(library));
+    if faults.has_errors() {
         return Err(faults.into());
     }
     let runs = sweep.runs();

@@ -7,7 +7,7 @@ use manylight::{
     files::{check_writable, write_text},
     lab::{
         metrics::Known,
-        sweep::{SceneUse, Sweep},
+        sweep::SceneUse,
         tune::{Goal, choose, preset},
     },
     library,
@@ -29,11 +29,8 @@ pub fn run(cli: &Cli, args: &TuneArgs) -> Result<(), Fault> {
     };
     let library = library::open(cli.root.as_deref())?;
     library::scene(&library, &args.scene)?;
-    let mut sweep = Sweep::read(&library::sweep(&library, &args.sweep)?, args.lab.small)?;
+    let mut sweep = lab::read(&library, &args.sweep, &args.lab)?;
     sweep.scenes = vec![SceneUse { scene: lab::given(&sweep, &args.scene), reference: None, standard_error: None }];
-    if let Some(size) = args.lab.size {
-        sweep.sizes = vec![size];
-    }
     if sweep.sizes.len() > 1 {
         return Err(Fault::Usage(format!(
             "the sweep `{}` has several sizes, whose times do not compare: choose one with --size",
