@@ -69,6 +69,7 @@ pub(crate) struct Draw {
     pub(crate) pipeline: wgpu::RenderPipeline,
     pub(crate) bindings: Bindings,
     pub(crate) vertices: u32,
+    pub(crate) instances: u32,
     /// Views for frames of even and odd index, and whether the target is cleared.
     pub(crate) targets: Vec<([wgpu::TextureView; 2], bool)>,
     pub(crate) depth: Option<([wgpu::TextureView; 2], bool)>,

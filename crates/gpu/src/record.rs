@@ -70,5 +70,5 @@ pub(crate) fn draw(encoder: &mut wgpu::CommandEncoder, label: &str, step: &Draw,
     for (index, group) in &step.bindings.groups[parity] {
         pass.set_bind_group(*index, group, &[]);
     }
-    pass.draw(0..step.vertices, 0..1);
+    pass.draw(0..step.vertices, 0..step.instances);
 }

@@ -108,7 +108,7 @@ pub(crate) fn pass(
         (PlanStep::Compute { groups, .. }, Pipeline::Compute(pipeline)) => {
             Ok(Pass::Compute(vec![Dispatch { pipeline, bindings, groups: *groups }]))
         }
-        (PlanStep::Draw { vertices, targets, depth, .. }, Pipeline::Render(pipeline)) => {
+        (PlanStep::Draw { vertices, instances, targets, depth, .. }, Pipeline::Render(pipeline)) => {
             let mut attach = |ix: ResourceIx| {
                 let of = |parity| match finder.memory(Target::Resource(ix), parity)? {
                     Memory::Texture(texture) => Ok(view(texture, false, Some(0))),
@@ -121,7 +121,7 @@ pub(crate) fn pass(
             let targets = targets.iter().map(|ix| attach(*ix));
             let targets = targets.collect::<Result<_, _>>()?;
             let depth = depth.map(attach).transpose()?;
-            Ok(Pass::Draw(Box::new(Draw { pipeline, bindings, vertices: *vertices, targets, depth })))
+            Ok(Pass::Draw(Box::new(Draw { pipeline, bindings, vertices: *vertices, instances: *instances, targets, depth })))
         }
         _ => Err("the pipeline does not fit the step".to_owned()),
     }

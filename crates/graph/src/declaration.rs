@@ -161,7 +161,7 @@ pub(crate) fn read_type(reader: &mut Reader, tree: &Tree) -> Option<String> {
 }
 
 const STEP: Shape = Shape { what: "a step", required: &["entry", "over"], optional: &["repeat"] };
-const DRAW: Shape = Shape { what: "Draw", required: &["vertex", "fragment", "vertices", "targets"], optional: &["depth"] };
+const DRAW: Shape = Shape { what: "Draw", required: &["vertex", "fragment", "vertices", "targets"], optional: &["instances", "depth"] };
 
 /// The names that a step may use.
 struct Names<'a> {
@@ -196,6 +196,10 @@ fn read_step(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Step
             let vertex = fields.get("vertex").and_then(|t| reader.text(t, "the name of an entry point in quotes"));
             let fragment = fields.get("fragment").and_then(|t| reader.text(t, "the name of an entry point in quotes"));
             let vertices = fields.get("vertices").and_then(|t| read_expr(reader, t, names));
+            let instances = match fields.get("instances") {
+                Some(tree) => read_expr(reader, tree, names),
+                None => Some(Expr::Const(1)),
+            };
             let mut targets = Vec::new();
             if let Some(tree) = fields.get("targets") {
                 for item in reader.list(tree, "output ports") {
@@ -214,7 +218,8 @@ fn read_step(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Step
             {
                 reader.error(&head(tree), "the step draws to nothing", "name an output port in `targets` or `depth`");
             }
-            Some(Step::Draw { vertex: vertex?.text, fragment: fragment?.text, vertices: vertices?, targets, depth, span })
+            let (vertex, fragment) = (vertex?.text, fragment?.text);
+            Some(Step::Draw { vertex, fragment, vertices: vertices?, instances: instances?, targets, depth, span })
         }
         Some(other) => {
             reader.error(&head(tree), format!("unknown kind of step `{other}`"), "write `(entry: \"…\", over: …)` or `Draw(…)`");

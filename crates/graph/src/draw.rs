@@ -129,8 +129,8 @@ impl Plan {
                 PlanStep::Compute { entry, groups, mip } => {
                     json!({ "entry": entry, "groups": groups, "mip": mip.as_ref().map(|(port, level)| json!({ "port": port, "level": level })) })
                 }
-                PlanStep::Draw { vertex, fragment, vertices, targets, depth } => json!({
-                    "vertex": vertex, "fragment": fragment, "vertices": vertices,
+                PlanStep::Draw { vertex, fragment, vertices, instances, targets, depth } => json!({
+                    "vertex": vertex, "fragment": fragment, "vertices": vertices, "instances": instances,
                     "targets": targets.iter().map(|ix| name(*ix)).collect::<Vec<_>>(), "depth": depth.map(name),
                 }),
             });

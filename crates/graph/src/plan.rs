@@ -116,6 +116,8 @@ pub enum PlanStep {
         fragment: String,
         /// Number of vertices.
         vertices: u32,
+        /// How often all of them are drawn.
+        instances: u32,
         /// Colour attachments: resources in the order of `@location`.
         targets: Vec<ResourceIx>,
         /// Depth attachment.

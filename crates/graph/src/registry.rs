@@ -141,6 +141,8 @@ pub enum Step {
         fragment: String,
         /// Number of vertices.
         vertices: Expr,
+        /// How often all of them are drawn (`@builtin(instance_index)`).
+        instances: Expr,
         /// Output ports in the order of `@location`; cleared to zero first.
         targets: Vec<String>,
         /// Output port of format `Depth32Float` for the depth test (reverse z: cleared to 0, nearer is greater).

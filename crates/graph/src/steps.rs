@@ -82,7 +82,9 @@ pub(crate) fn unroll(id: &str, scope: &NodeScope<'_>, out: &mut Vec<Diagnostic>)
                     format!("draws to `{a}` with {}×{} and to `{b}` with {}×{} texels", size.0, size.1, other.0, other.1),
                     "give the resources of all targets one size",
                 ),
-                StepError::Vertices(count) => fault(format!("draws {count} vertices, more than 2^32"), "draw fewer triangles"),
+                StepError::Draws(count) => {
+                    fault(format!("draws {count} vertices or instances, more than 2^32"), "draw fewer triangles, or less often")
+                }
             });
         }
     }
@@ -93,7 +95,8 @@ enum StepError {
     Eval(EvalError),
     Groups([u64; 3]),
     Repeats(u64),
-    Vertices(u64),
+    /// Vertices or instances.
+    Draws(u64),
     /// Two targets with their sizes.
     Targets([(String, (u32, u32)); 2]),
 }
@@ -133,9 +136,10 @@ fn unroll_step(step: &Step, scope: &NodeScope<'_>, steps: &mut Vec<PlanStep>) ->
                 }
             }
         }
-        Step::Draw { vertex, fragment, vertices, targets, depth, .. } => {
-            let vertices = expr::eval(vertices, scope)?;
-            let vertices = u32::try_from(vertices).map_err(|_| StepError::Vertices(vertices))?;
+        Step::Draw { vertex, fragment, vertices, instances, targets, depth, .. } => {
+            let count =
+                |expr| expr::eval(expr, scope).map_err(StepError::from).and_then(|n| u32::try_from(n).map_err(|_| StepError::Draws(n)));
+            let (vertices, instances) = (count(vertices)?, count(instances)?);
             let sized = |port: &String| scope.texture(port).map(|size| (port.clone(), size));
             let mut all = targets.iter().chain(depth).filter_map(sized);
             if let Some(first) = all.next()
@@ -146,7 +150,7 @@ fn unroll_step(step: &Step, scope: &NodeScope<'_>, steps: &mut Vec<PlanStep>) ->
             let resource = |port: &String| scope.ports.get(port.as_str()).map(|(ix, _)| *ix);
             let targets = targets.iter().filter_map(resource).collect();
             let depth = depth.as_ref().and_then(resource);
-            steps.push(PlanStep::Draw { vertex: vertex.clone(), fragment: fragment.clone(), vertices, targets, depth });
+            steps.push(PlanStep::Draw { vertex: vertex.clone(), fragment: fragment.clone(), vertices, instances, targets, depth });
             Ok(())
         }
     }

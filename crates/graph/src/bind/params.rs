@@ -187,6 +187,6 @@ fn step_params(step: &Step, found: &mut BTreeSet<String>) {
                 walk(count, found);
             }
         }
-        Step::Draw { vertices, .. } => walk(vertices, found),
+        Step::Draw { vertices, instances, .. } => [vertices, instances].into_iter().for_each(|e| walk(e, found)),
     }
 }

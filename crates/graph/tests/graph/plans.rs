@@ -65,8 +65,14 @@ fn draws_have_targets_and_vertices() {
     let plan = try_plan(&files(), &set(&[("blur", "false")])).unwrap();
     assert_eq!(ids(&plan), ["scene", "hard", "show"]);
     let albedo = plan.resource("albedo").unwrap();
-    let step =
-        PlanStep::Draw { vertex: "vs".into(), fragment: "fs".into(), vertices: 36, targets: vec![albedo], depth: plan.resource("depth") };
+    let step = PlanStep::Draw {
+        vertex: "vs".into(),
+        fragment: "fs".into(),
+        vertices: 36,
+        instances: 1,
+        targets: vec![albedo],
+        depth: plan.resource("depth"),
+    };
     assert_eq!(plan.nodes[0].steps, [step]);
     assert!(plan.resources[albedo].usage.target && plan.resources[albedo].usage.read && !plan.resources[albedo].usage.storage);
     let reasons: Vec<_> = plan.idle.iter().map(|n| (n.id.as_str(), n.reason.clone())).collect();
