@@ -1,4 +1,4 @@
-// Indirect light with soft shadows from imperfect shadow maps, or with hard ones by rays. [ACRSM] 5.3.3, [VAL] 6, [PCSS].
+// Indirect light with soft shadows from shadow maps, or with hard ones by rays. [ACRSM] 5.3.3, [VAL] 6, [PCSS], [CV] 4.
 // Tile t is lit by the clusters c with c mod n² = t, times n². Eq. 5.5's intensity omits the light's flux: here it is included (methods: radiometry).
 // Differs from the papers: taps are compared with the receiver's tangent plane, the bias is a share of the distance.
 // What bounds it: k / n² lights per pixel, with each 32 reads of the atlas (pcss) or a ray through some tens of nodes (exact: on a software
@@ -7,6 +7,7 @@
 
 #import common::bvh::{RAY_OFFSET, visible}
 #import common::cluster::{Cluster, CLUSTER_ACTIVE}
+#import common::cssm::{Region, depth_range, fetch, region, series, series_value, slabs_of}
 #import common::scene::SceneInfo
 #import common::octahedral::unpack_unit
 #import common::paraboloid::{basis, paraboloid_project, paraboloid_unproject, paraboloid_scale, atlas_origin}
@@ -22,6 +23,9 @@ struct Params {
     atlas_width: u32,
     pcss_search: f32,
     pcss_limit: f32,
+    exact_bias: f32,
+    terms: u32,
+    cssm_margin: f32,
 }
 
 @group(0) @binding(0) var split_position: texture_2d<f32>;
@@ -31,19 +35,52 @@ struct Params {
 @group(0) @binding(4) var<uniform> scene_info: SceneInfo;
 @group(0) @binding(5) var<uniform> params: Params;
 @group(0) @binding(6) var split_light: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(7) var<storage, read> casters: array<Cluster>;
+@group(0) @binding(8) var<storage, read> caster_of: array<u32>;
+@group(0) @binding(9) var cssm: texture_2d<f32>;
+@group(0) @binding(10) var linear_sampler: sampler;
 
 override lights_is_val: bool;
 override visibility_is_simple: bool;
 override visibility_is_pcss: bool;
+override visibility_is_cssm: bool;
 override visibility_is_exact: bool;
+override maps_is_imperfect: bool;
 override shadow_plane: bool;
 
+// A receiver as a caster sees it.
 struct Receiver {
-    origin: vec2u, // of the light's map in the atlas
+    map: u32, // index of the caster
+    origin: vec2u, // of its map in the atlas
     texel: vec2f, // in the map
-    normal: vec3f, // in the light's frame
-    own: f32, // distance from the light
-    height: f32, // offset from the light along the normal
+    normal: vec3f, // in the caster's frame
+    own: f32, // distance from the caster
+    height: f32, // offset from the caster along the normal
+    light_angle: f32, // radius of the caster's disk over the distance
+    texels_per_angle: f32, // in the map, there
+}
+
+fn receiver(caster: u32, position: vec3f, normal: vec3f) -> Receiver {
+    let light = casters[caster];
+    let frame = basis(light.normal);
+    let v = position - light.position;
+    let local = v * frame; // transpose × vector
+    let size = f32(params.ism_size);
+    var r: Receiver;
+    r.map = caster;
+    r.origin = atlas_origin(caster, params.ism_size, params.atlas_width / params.ism_size);
+    r.normal = normal * frame;
+    r.own = max(length(v), 1e-15);
+    r.height = dot(r.normal, local);
+    // Below a caster's horizon, where its lights with other normals may shine, its map ends: what is at the horizon counts, so that shadows have no
+    // edge there. ([CV] 5.1 calls all that lies below visible.)
+    let above = vec3f(local.xy, max(local.z, 0.0));
+    let disk = paraboloid_project(above * inverseSqrt(max(dot(above, above), 1e-30)));
+    r.texel = (0.5 + 0.5 * disk) * size;
+    r.light_angle = sqrt(light.area / PI) / r.own;
+    // The unit disk is half of the map.
+    r.texels_per_angle = paraboloid_scale(disk) * 0.5 * size;
+    return r;
 }
 
 // Ratio of the distance stored in a tap to the receiver's distance along the tap's ray; ≥ 1 − bias: not a blocker.
@@ -59,16 +96,12 @@ fn tap_ratio(r: Receiver, offset: vec2f) -> f32 {
 }
 
 // Visibility between the receiver and a disk light by its map, 0 to 1. [ACRSM] 5.3.3, [PCSS]
-fn map_visibility(r: Receiver, light_radius: f32) -> f32 {
-    let threshold = 1.0 - params.shadow_bias;
+fn map_visibility(r: Receiver) -> f32 {
+    let threshold = 1.0 - select(params.exact_bias, params.shadow_bias, maps_is_imperfect);
     if visibility_is_simple {
         return select(0.0, 1.0, tap_ratio(r, vec2f(0.0)) >= threshold);
     }
-    // Texels per angle at the receiver's place in the map: the unit disk is half of it.
-    let disk = r.texel * (2.0 / f32(params.ism_size)) - 1.0;
-    let texels_per_angle = paraboloid_scale(disk) * 0.5 * f32(params.ism_size);
-    let light_angle = light_radius / r.own;
-    let search = clamp(params.pcss_search * light_angle * texels_per_angle, 1.0, params.pcss_limit);
+    let search = clamp(params.pcss_search * r.light_angle * r.texels_per_angle, 1.0, params.pcss_limit);
     var blockers = 0.0;
     var sum = 0.0;
     var direction = FIRST_DIRECTION;
@@ -85,7 +118,7 @@ fn map_visibility(r: Receiver, light_radius: f32) -> f32 {
     }
     // Mean blocker over receiver; [VAL] eq. 3: penumbra over light = (z_receiver − z_blocker) / z_blocker.
     let ratio = max(sum / blockers, 1e-3);
-    let penumbra = light_angle * (1.0 - ratio) / ratio * texels_per_angle;
+    let penumbra = r.light_angle * (1.0 - ratio) / ratio * r.texels_per_angle;
     let radius = clamp(penumbra, 1.0, params.pcss_limit);
     var lit = 0.0;
     direction = FIRST_DIRECTION;
@@ -94,6 +127,32 @@ fn map_visibility(r: Receiver, light_radius: f32) -> f32 {
         direction = next_direction(direction);
     }
     return lit / f32(TAPS);
+}
+
+// The same by Fourier series whose terms are averaged over the penumbra. [CV] 4
+fn cssm_visibility(r: Receiver) -> f32 {
+    let size = params.ism_size;
+    let maps_per_row = params.atlas_width / size;
+    let atlas_height = textureDimensions(ism).y;
+    let slabs = slabs_of(params.terms);
+    // The receiver's own surface stands this much behind the depth compared, and counts as lit.
+    let margin = params.cssm_margin / f32(2u * params.terms);
+    let d = r.own / depth_range(casters[r.map].position, scene_info) - margin;
+    let lit = series_value(margin, params.terms);
+
+    let search = region(r.map, r.texel, 2.0 * params.pcss_search * r.light_angle * r.texels_per_angle, size, maps_per_row);
+    let free = 0.5 + series(cssm, linear_sampler, search, 0u, atlas_height, params.terms, d);
+    let depth = fetch(cssm, linear_sampler, search, 2u * slabs, atlas_height).x;
+    let free_depth = 0.5 * depth + series(cssm, linear_sampler, search, slabs, atlas_height, params.terms, d);
+    let blocked = 1.0 - free / lit;
+    if blocked <= 0.0 {
+        return 1.0; // nothing is in front
+    }
+    // Mean depth of what is in front; [CV] 4.2: penumbra p = A (d − z) / z / cosβ, seen under atan(p cosβ / d): the slope β cancels.
+    let blocker = clamp((depth - free_depth / lit) / blocked, 1e-3 * d, d);
+    let angle = atan(2.0 * r.light_angle * (d - blocker) / blocker);
+    let filtered = region(r.map, r.texel, angle * r.texels_per_angle, size, maps_per_row);
+    return saturate((0.5 + series(cssm, linear_sampler, filtered, 0u, atlas_height, params.terms, d)) / lit);
 }
 
 @compute @workgroup_size(8, 8)
@@ -127,15 +186,9 @@ fn light(@builtin(global_invocation_id) id: vec3u) {
             let e = cluster.flux * disk_form_factor(cos_receiver, cos_light, d2_kept, select(0.0, cluster.area, lights_is_val));
             unshadowed += luminance(e);
             if visibility_is_simple || visibility_is_pcss {
-                let frame = basis(cluster.normal);
-                let local = v * frame; // transpose × vector
-                var r: Receiver;
-                r.normal = normal * frame;
-                r.own = sqrt(d2);
-                r.height = dot(r.normal, local);
-                r.texel = (0.5 + 0.5 * paraboloid_project(local * inverseSqrt(max(d2, 1e-30)))) * f32(params.ism_size);
-                r.origin = atlas_origin(c, params.ism_size, params.atlas_width / params.ism_size);
-                irradiance += e * map_visibility(r, sqrt(cluster.area / PI));
+                irradiance += e * map_visibility(receiver(caster_of[c], surface.xyz, normal));
+            } else if visibility_is_cssm {
+                irradiance += e * cssm_visibility(receiver(caster_of[c], surface.xyz, normal));
             } else if !visibility_is_exact || visible(surface.xyz + normal * lift, cluster.position + cluster.normal * lift) {
                 irradiance += e;
             }
