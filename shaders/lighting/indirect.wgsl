@@ -26,6 +26,7 @@ struct Params {
     exact_bias: f32,
     terms: u32,
     cssm_margin: f32,
+    cssm_slope: f32,
 }
 
 @group(0) @binding(0) var split_position: texture_2d<f32>;
@@ -129,6 +130,9 @@ fn map_visibility(r: Receiver) -> f32 {
     return lit / f32(TAPS);
 }
 
+// The slope of a surface is bounded where the caster sees it at a grazing angle: 5.
+const MIN_SLOPE_COSINE: f32 = 0.2;
+
 // The same by Fourier series whose terms are averaged over the penumbra. [CV] 4
 fn cssm_visibility(r: Receiver) -> f32 {
     let size = params.ism_size;
@@ -137,10 +141,15 @@ fn cssm_visibility(r: Receiver) -> f32 {
     let slabs = slabs_of(params.terms);
     // The receiver's own surface stands this much behind the depth compared, and counts as lit.
     let margin = params.cssm_margin / f32(2u * params.terms);
-    let d = r.own / depth_range(casters[r.map].position, scene_info) - margin;
     let lit = series_value(margin, params.terms);
+    let own = r.own / depth_range(casters[r.map].position, scene_info);
+    // Seen at an angle, the surface comes nearer to the caster within the region that is averaged, by this per radian.
+    let cosine = max(abs(r.height) / r.own, MIN_SLOPE_COSINE);
+    let slope = params.cssm_slope * own * sqrt(1.0 - cosine * cosine) / cosine;
 
-    let search = region(r.map, r.texel, 2.0 * params.pcss_search * r.light_angle * r.texels_per_angle, size, maps_per_row);
+    let search_angle = params.pcss_search * r.light_angle;
+    let search = region(r.map, r.texel, 2.0 * search_angle * r.texels_per_angle, size, maps_per_row);
+    var d = own - margin - slope * search_angle;
     let free = 0.5 + series(cssm, linear_sampler, search, 0u, atlas_height, params.terms, d);
     let depth = fetch(cssm, linear_sampler, search, 2u * slabs, atlas_height).x;
     let free_depth = 0.5 * depth + series(cssm, linear_sampler, search, slabs, atlas_height, params.terms, d);
@@ -151,6 +160,7 @@ fn cssm_visibility(r: Receiver) -> f32 {
     // Mean depth of what is in front; [CV] 4.2: penumbra p = A (d − z) / z / cosβ, seen under atan(p cosβ / d): the slope β cancels.
     let blocker = clamp((depth - free_depth / lit) / blocked, 1e-3 * d, d);
     let angle = atan(2.0 * r.light_angle * (d - blocker) / blocker);
+    d = own - margin - slope * 0.5 * angle;
     let filtered = region(r.map, r.texel, angle * r.texels_per_angle, size, maps_per_row);
     return saturate((0.5 + series(cssm, linear_sampler, filtered, 0u, atlas_height, params.terms, d)) / lit);
 }

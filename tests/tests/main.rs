@@ -12,6 +12,7 @@ mod path_tracer;
 mod reference;
 mod renders;
 mod samples;
+mod shadow_maps;
 mod support;
 mod sweeps;
 mod twin;
