@@ -10,6 +10,7 @@ use crate::{
     pipeline::{Gaps, Pipeline, Preset},
     plan::PlanInput,
     planner::Planner,
+    refuse::refused,
     registry::Registry,
     resolve::{Linked, link, preset_fault},
     unused,
@@ -20,16 +21,25 @@ use crate::{
 const OUTPUT: (u32, u32) = (1920, 1080);
 
 /// Everything that can be known without a scene: names, types, connections, cycles and sizes, for the defaults and for every option of every
-/// choice and both values of every switch, one at a time, with and without what a scene may have.
+/// choice and both values of every switch, one at a time, with and without what a scene may have. What the pipeline refuses is not looked at,
+/// unless it is what the pipeline does by itself.
 pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
     let mut out = Vec::new();
     let linked = link(pipeline, registry, features::KNOWN.to_vec(), &mut out);
     let values = Values::assign(&linked, &[], &mut out);
     let mut known: Vec<Diagnostic> = Vec::new();
-    let all = |on: bool| -> BTreeMap<String, bool> { features::KNOWN.iter().map(|f| ((*f).to_owned(), on)).collect() };
-    let (none, every) = (all(false), all(true));
-
+    let with =
+        |has: &dyn Fn(&str) -> bool| -> BTreeMap<String, bool> { features::KNOWN.iter().map(|f| ((*f).to_owned(), has(f))).collect() };
+    let (none, every) = (with(&|_| false), with(&|_| true));
+    let mut scenes = vec![(every.clone(), String::new()), (none.clone(), "when the scene has no special features".to_owned())];
+    scenes.extend(features::KNOWN.iter().map(|only| (with(&|f| f == *only), format!("when the scene has only `{only}`"))));
+    if scenes.iter().all(|(features, _)| !refused(&linked, &values, &[], features).is_empty()) {
+        out.extend(refused(&linked, &values, &[], &every));
+    }
     let mut attempt = |values: &Values<'_>, features: &BTreeMap<String, bool>, when: &str, worst: Severity| {
+        if !refused(&linked, values, &[], features).is_empty() {
+            return;
+        }
         for fault in faults(&linked, values, features) {
             // One cause shows in many variants: it is told once, with the first variant that has it.
             let same = |other: &Diagnostic| {
@@ -44,14 +54,12 @@ pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
             out.push(Diagnostic { message, severity, ..fault });
         }
     };
-    attempt(&values, &every, "", Severity::Error);
-    attempt(&values, &none, "when the scene has no special features", Severity::Error);
-    for name in features::KNOWN {
-        let mut one = none.clone();
-        one.insert((*name).to_owned(), true);
-        attempt(&values, &one, &format!("when the scene has only `{name}`"), Severity::Error);
+    for (features, when) in &scenes {
+        attempt(&values, features, when, Severity::Error);
     }
-    for (name, param) in &pipeline.params {
+    // Without knowing what is refused, all that would follow from it would be told.
+    let tried = pipeline.params.iter().filter(|_| !linked.refusals_unclear);
+    for (name, param) in tried {
         let current = values.get(name).cloned();
         // The end of a range may be too much beside another parameter's value (memory, say), and a preset may set what another option needs:
         // that is good to know, and no fault of the pipeline.

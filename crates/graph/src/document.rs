@@ -10,7 +10,7 @@ use crate::{
     diagnostics::{Diagnostic, Source, Span},
     expr, format,
     params::{Literal, check_identifier, read_literal, read_params},
-    pipeline::{Argument, ArgumentValue, Connection, Gaps, Mips, NodeUse, Preset, Resource, ResourceKind, Size},
+    pipeline::{Argument, ArgumentValue, Connection, Gaps, Mips, NodeUse, Preset, Refusal, Resource, ResourceKind, Size},
     reader::{Reader, Shape, Spanned, head},
     registry::Param,
     render::suggest,
@@ -30,6 +30,7 @@ pub(crate) struct Document {
     pub params: IndexMap<String, Param>,
     pub resources: IndexMap<String, Resource>,
     pub nodes: Vec<NodeUse>,
+    pub refuse: Vec<Refusal>,
     pub presents: Option<Spanned>,
     pub radiance: Option<Spanned>,
     pub gaps: Gaps,
@@ -38,9 +39,9 @@ pub(crate) struct Document {
 const PIPELINE: Shape = Shape {
     what: "Pipeline",
     required: &["doc"],
-    optional: &["extends", "set", "include", "params", "resources", "nodes", "presents", "radiance"],
+    optional: &["extends", "set", "include", "params", "resources", "nodes", "refuse", "presents", "radiance"],
 };
-const STAGE: Shape = Shape { what: "Stage", required: &["doc"], optional: &["include", "params", "resources", "nodes"] };
+const STAGE: Shape = Shape { what: "Stage", required: &["doc"], optional: &["include", "params", "resources", "nodes", "refuse"] };
 
 /// Reads a file; faults go to `out`.
 pub(crate) fn read(source: &Arc<Source>, stage: &str, out: &mut Vec<Diagnostic>) -> Option<Document> {
@@ -102,6 +103,15 @@ fn read_document(reader: &mut Reader, tree: &Tree, stage: &str) -> Option<Docume
             }
         }
     }
+    let mut refuse = Vec::new();
+    if let Some(tree) = fields.get("refuse") {
+        for item in reader.list(tree, "refusals") {
+            match read_refusal(reader, item) {
+                Some(refusal) => refuse.push(refusal),
+                None => gaps.refuse = true,
+            }
+        }
+    }
     let mut presents = text(reader, "presents", "the name of a resource in quotes");
     if presents.is_none() && fields.tried("presents") {
         // Reported already; it is not missing.
@@ -118,6 +128,7 @@ fn read_document(reader: &mut Reader, tree: &Tree, stage: &str) -> Option<Docume
         params,
         resources,
         nodes,
+        refuse,
         presents,
         radiance,
         gaps,
@@ -238,6 +249,19 @@ fn read_mips(reader: &mut Reader, tree: &Tree) -> Option<Mips> {
             None
         }
     }
+}
+
+const REFUSAL: Shape = Shape { what: "a refusal", required: &["when", "because"], optional: &[] };
+
+fn read_refusal(reader: &mut Reader, tree: &Tree) -> Option<Refusal> {
+    if !matches!(tree.kind, Kind::Record(None, _) | Kind::Tuple(None, _)) {
+        reader.expected(tree, "a refusal", "write `(when: All([…]), because: \"…\")`");
+        return None;
+    }
+    let fields = reader.record(tree, &REFUSAL)?;
+    let when = fields.get("when").and_then(|t| condition::read(reader, t));
+    let because = fields.get("because").and_then(|t| reader.text(t, "a sentence in quotes"));
+    Some(Refusal { when: when?, because: because?.text })
 }
 
 const NODE: Shape = Shape { what: "a node", required: &["id", "node"], optional: &["in", "out", "params", "when"] };

@@ -38,7 +38,7 @@
 //! | [`ron`] | reading RON with places, for other documents |
 //!
 //! The way of a text: `tree` (RON with places) → `reader` → `declaration` or `document` → `merge` → `resolve` (names) → `planner` (`assign`,
-//! `order`, `sizes`, `steps`, `slots`). The way of a shader: `wgsl` (a look at the text) → `compose` → `reflect` → `bind` (against the declaration).
+//! `refuse`, `order`, `sizes`, `steps`, `slots`). The way of a shader: `wgsl` (a look at the text) → `compose` → `reflect` → `bind` (against the declaration).
 
 mod assign;
 mod bind;
@@ -64,6 +64,7 @@ pub mod planner;
 mod reader;
 pub mod reference;
 mod reflect;
+mod refuse;
 pub mod registry;
 mod render;
 mod resolve;

@@ -8,7 +8,7 @@ use crate::{
     diagnostics::{Diagnostic, Diagnostics, Source, Span},
     document::{self, Document},
     library::{Library, ReadError, stem},
-    pipeline::{Gaps, NodeUse, Pipeline, Preset, Resource},
+    pipeline::{Gaps, NodeUse, Pipeline, Preset, Refusal, Resource},
     reader::Spanned,
     registry::Param,
     render::and_also,
@@ -59,6 +59,7 @@ struct Layer {
     set: IndexMap<String, Preset>,
     resources: IndexMap<String, Resource>,
     nodes: IndexMap<String, NodeUse>,
+    refuse: Vec<Refusal>,
     presents: Option<Spanned>,
     radiance: Option<Spanned>,
     gaps: Gaps,
@@ -163,13 +164,14 @@ impl Loader<'_> {
             let span = node.id.span.clone();
             self.insert(&mut own.nodes, id, node, "node", |n| n.id.span.clone(), span);
         }
+        own.refuse.extend(stage.refuse);
         // What was given twice was left out once.
         own.gaps.nodes |= self.out.len() > before;
     }
 
     fn join_document(&mut self, own: &mut Layer, document: Document) {
-        let Document { doc, head, set, params, resources, nodes, presents, radiance, gaps, .. } = document;
-        let mut layer = Layer { doc, head: Some(head), params, resources, presents, radiance, gaps, ..Layer::default() };
+        let Document { doc, head, set, params, resources, nodes, refuse, presents, radiance, gaps, .. } = document;
+        let mut layer = Layer { doc, head: Some(head), params, resources, refuse, presents, radiance, gaps, ..Layer::default() };
         layer.set.extend(set);
         let before = self.out.len();
         for node in nodes {
@@ -206,20 +208,21 @@ impl Loader<'_> {
 impl Layer {
     /// Lays another over this one: what it gives wins.
     fn overlay(&mut self, over: Self) {
-        let Self { doc, head, params, set, resources, nodes, presents, radiance, gaps } = over;
+        let Self { doc, head, params, set, resources, nodes, refuse, presents, radiance, gaps } = over;
         self.doc = doc;
         self.head = head;
         self.params.extend(params);
         self.set.extend(set);
         self.resources.extend(resources);
         self.nodes.extend(nodes);
+        self.refuse.extend(refuse);
         self.presents = presents.or(self.presents.take());
         self.radiance = radiance.or(self.radiance.take());
         self.gaps.extend(gaps);
     }
 
     fn finish(self, name: String, sources: Vec<Arc<Source>>, out: &mut Vec<Diagnostic>) -> Option<Pipeline> {
-        let Self { doc, head, params, set, resources, nodes, presents, radiance, gaps, .. } = self;
+        let Self { doc, head, params, set, resources, nodes, refuse, presents, radiance, gaps } = self;
         let Some(presents) = presents else {
             if !gaps.files {
                 let fault = Diagnostic::error("missing field `presents` in Pipeline", head?);
@@ -227,6 +230,6 @@ impl Layer {
             }
             return None;
         };
-        Some(Pipeline { name, doc, params, set, resources, nodes, presents, radiance, sources, gaps })
+        Some(Pipeline { name, doc, params, set, resources, nodes, refuse, presents, radiance, sources, gaps })
     }
 }

@@ -29,6 +29,8 @@ pub struct Pipeline {
     pub resources: IndexMap<String, Resource>,
     /// Nodes in document order, by id.
     pub nodes: IndexMap<String, NodeUse>,
+    /// Combinations of values that make no sense, those of extended and included files first.
+    pub refuse: Vec<Refusal>,
     /// The resource to show.
     pub presents: Spanned,
     /// The resource with linear radiance.
@@ -46,6 +48,8 @@ pub(crate) struct Gaps {
     pub resources: BTreeSet<String>,
     /// Some node was left out.
     pub nodes: bool,
+    /// Some refusal was left out: what it refuses may be faulty.
+    pub refuse: bool,
     /// Some file was left out: any name may have been in it.
     pub files: bool,
 }
@@ -55,6 +59,7 @@ impl Gaps {
         self.params.extend(other.params);
         self.resources.extend(other.resources);
         self.nodes |= other.nodes;
+        self.refuse |= other.refuse;
         self.files |= other.files;
     }
 }
@@ -68,6 +73,15 @@ pub struct Preset {
     pub name_span: Span,
     /// Where the value stands.
     pub span: Span,
+}
+
+/// A combination of values that makes no sense.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refusal {
+    /// The values.
+    pub when: Condition,
+    /// Why, in a sentence.
+    pub because: String,
 }
 
 /// A texture or buffer that nodes write and read.

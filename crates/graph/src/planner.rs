@@ -8,6 +8,7 @@ use crate::{
     order::{self, Dag},
     pipeline::Pipeline,
     plan::{Idle, IdleNode, Lifetime, Plan, PlanInput, PlanNode, PlanResource, Target, Usage},
+    refuse,
     registry::{Direction, Registry, Step},
     resolve::{Linked, Wire, link},
     sizes::{LARGEST_SIDE, Sizes},
@@ -18,7 +19,7 @@ use crate::{
 /// Plans a frame.
 ///
 /// # Errors
-/// Everything that is wrong with the pipeline, the values set, or the sizes that come of them.
+/// Everything that is wrong with the pipeline, the values set, or the sizes that come of them; a combination of values that it refuses.
 pub fn plan(pipeline: &Pipeline, registry: &Registry, input: &PlanInput) -> Result<Plan, Diagnostics> {
     let mut out = Vec::new();
     let (width, height) = input.output;
@@ -36,6 +37,12 @@ pub fn plan(pipeline: &Pipeline, registry: &Registry, input: &PlanInput) -> Resu
         out.push(fault.help("mend those first; `check` shows them"));
     }
     let values = Values::assign(&linked, &input.set, &mut out);
+    let refused = refuse::refused(&linked, &values, &input.set, &input.features);
+    if !refused.is_empty() {
+        // What else is wrong with these values follows from it.
+        out.extend(refused);
+        return Err(Diagnostics(out).sorted());
+    }
     let plan = Planner { linked: &linked, values: &values, input, out: &mut out }.run();
     let faults = Diagnostics(out).sorted();
     match plan {
@@ -43,6 +50,14 @@ pub fn plan(pipeline: &Pipeline, registry: &Registry, input: &PlanInput) -> Resu
         _ if faults.has_errors() => Err(faults),
         _ => Err(Diagnostic::error_nowhere(format!("the pipeline `{}` cannot be planned", pipeline.name)).into()),
     }
+}
+
+/// Why the pipeline refuses the values of an input; empty if it does not. What is wrong otherwise is told by [`plan`].
+pub fn refusals(pipeline: &Pipeline, registry: &Registry, input: &PlanInput) -> Diagnostics {
+    let mut unheard = Vec::new();
+    let linked = link(pipeline, registry, input.features.keys().map(String::as_str).collect(), &mut unheard);
+    let values = Values::assign(&linked, &input.set, &mut unheard);
+    Diagnostics(refuse::refused(&linked, &values, &input.set, &input.features)).sorted()
 }
 
 mod live;

@@ -27,6 +27,8 @@ pub(crate) struct Linked<'a> {
     pub incomplete: bool,
     /// Resources whose connections are faulty: nothing more is said of them.
     pub tainted: BTreeSet<String>,
+    /// Some refusal cannot be decided: what it refuses may be faulty.
+    pub refusals_unclear: bool,
 }
 
 /// A node with its declaration.
@@ -108,10 +110,11 @@ pub(crate) fn link<'a>(pipeline: &'a Pipeline, registry: &'a Registry, features:
     linker.resources();
     let nodes: Vec<_> = pipeline.nodes.values().map(|node| linker.node(node)).collect();
     linker.presets(&nodes);
+    let refusals_unclear = linker.refusals();
     linker.never_written(&nodes);
     linker.shown();
     let Linker { incomplete, tainted, .. } = linker;
-    Linked { pipeline, registry, nodes, incomplete, tainted }
+    Linked { pipeline, registry, nodes, incomplete, tainted, refusals_unclear }
 }
 
 impl<'a> Linker<'a, '_> {

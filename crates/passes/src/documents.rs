@@ -73,7 +73,7 @@ impl Documents {
     /// What will run.
     ///
     /// # Errors
-    /// The pipeline's faults under this input. If it uses faulty nodes, the faults of the nodes themselves.
+    /// The pipeline's faults under this input, or why it refuses it. If it uses faulty nodes, the faults of the nodes themselves.
     pub fn plan(&self, input: &PlanInput) -> Result<Plan, Diagnostics> {
         planner::plan(&self.pipeline, &self.registry, input).map_err(|faults| {
             // That a faulty node cannot be used follows from its own faults: those are told instead.
@@ -86,6 +86,11 @@ impl Documents {
             }
             together(self.registry_faults.clone(), Diagnostics(own))
         })
+    }
+
+    /// Why the pipeline refuses this input; empty if it does not.
+    pub fn refusals(&self, input: &PlanInput) -> Diagnostics {
+        planner::refusals(&self.pipeline, &self.registry, input)
     }
 
     /// Where documents and shaders come from.

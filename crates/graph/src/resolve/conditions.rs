@@ -1,9 +1,19 @@
-//! Names in conditions.
+//! Names in conditions, of nodes and of refusals.
 
 use super::Linker;
 use crate::{condition::ConditionKind, diagnostics::Diagnostic, reader::Spanned, render::suggest, value::ParamKind};
 
 impl<'a> Linker<'a, '_> {
+    /// Whether some refusal cannot be decided, because it could not be read or names what is not there.
+    pub(super) fn refusals(&mut self) -> bool {
+        let before = self.out.len();
+        self.undecided = self.pipeline.gaps.refuse;
+        for refusal in &self.pipeline.refuse {
+            self.condition(&refusal.when);
+        }
+        self.undecided || self.out.len() > before
+    }
+
     pub(super) fn condition(&mut self, condition: &'a crate::condition::Condition) {
         let mut leaves = Vec::new();
         condition.leaves(&mut |leaf| leaves.push(leaf));

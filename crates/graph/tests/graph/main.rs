@@ -9,5 +9,6 @@ mod merging;
 mod nodes;
 mod pipelines;
 mod plans;
+mod refusals;
 mod reload;
 mod text;
