@@ -203,6 +203,30 @@ fn a_pipeline_edit_that_cannot_be_planned_keeps_the_last_good_frame() {
 }
 
 #[test]
+fn a_swap_to_what_the_pipeline_refuses_keeps_the_last_good_frame() {
+    let folder = library();
+    let rule = "refuse: [(when: All([Is(\"method\", \"tessellation\"), AtLeast(\"value\", 5)]), because: \"so bright, triangles show\")],";
+    write(folder.path(), "pipelines/test.ron", &PIPELINE.replace("presents:", &format!("{rule}\n    presents:")));
+    let mut renderer = renderer(folder.path(), &[("point_count", "4096"), ("method", "tessellation")]).expect("builds");
+    pixel(&mut renderer);
+    let told = "these values are refused: so bright, triangles show";
+    let fault = renderer.set_parameter("value", "5").expect_err("refused").render();
+    assert!(fault.contains(told) && fault.contains("set `method` to `area`"), "{fault}");
+    assert_eq!(pixel(&mut renderer)[3], 1.0);
+    // The same by an edit, as `watch` takes it over.
+    let path = folder.path().join("pipelines/test.ron");
+    let text = fs::read_to_string(&path).expect("readable");
+    write(folder.path(), "pipelines/test.ron", &text.replace("default: 2.0", "default: 6.0"));
+    let fault = renderer.reload(std::slice::from_ref(&path)).expect_err("refused").render();
+    assert!(fault.contains(told) && fault.contains("test.ron:13:"), "{fault}");
+    let kept = pixel(&mut renderer);
+    assert_eq!((kept[0], kept[3]), (2.0, 2.0));
+    write(folder.path(), "pipelines/test.ron", &text.replace("default: 2.0", "default: 4.0"));
+    renderer.reload(&[path]).expect("accepted");
+    assert_eq!(pixel(&mut renderer)[0], 4.0);
+}
+
+#[test]
 fn what_is_watched_covers_documents_shaders_and_scene() {
     let folder = library();
     let renderer = renderer(folder.path(), &[]).expect("builds");
