@@ -167,6 +167,60 @@ fn faults_of_sweeps_are_told_at_their_place() {
     assert!(!Path::new(&out).exists(), "nothing was run, nothing may be written");
 }
 
+/// Pipelines beside variants: runs and records of each; what one of them refuses is left out with the reason, also by later commands.
+#[test]
+fn pipelines_are_compared_and_what_they_refuse_is_left_out_with_the_reason() {
+    let sweep = r#"Sweep(
+        doc: "?", pipelines: ["acrsm", "ruled.ron"], variants: {"plain": (pipeline: "acrsm", set: {"visibility": "none"})},
+        vary: [{"clusters": [16, 32]}, {"rsm_size": [64]}, {"tiles": [1]}, {"ism_size": [16]}, {"atlas_width": [256]}],
+        scenes: ["cornell"], sizes: [(16, 16)], frames: 2, measure: 1, reference: (paths: 16),
+    )"#;
+    let rule = "(when: AtLeast(\"clusters\", 32), because: \"it is too many\")";
+    let ruled = |rule: &str| format!("Pipeline(doc: \"x\", extends: \"acrsm.ron\", refuse: [{rule}])");
+    let (folder, file) = with_sweep(sweep);
+    let out = path(folder.path(), "out");
+    fs::write(folder.path().join("ruled.ron"), ruled(rule)).expect("writable");
+    let own = ["sweep", &file, "--out", &out, "--cache", &path(folder.path(), "cache")];
+    let run = |more: &[&str]| manylight(&[&own, more].concat());
+    let reason = "ruled clusters=32 rsm_size=64 tiles=1 ism_size=16 atlas_width=256 | cornell | 16x16 | seed 0: these values are refused: it is too many (`clusters` is 32, at least 32)";
+    run(&[]).expect(0).says(&["5 of 5 runs have records", &format!("left out: {reason}")]);
+    run(&["--report"]).expect(0).says(&["5 of 5 runs have records"]);
+    run(&["--markdown", &out]).expect(0).says(&["(5 were there already)"]);
+    let read = |name: &str| fs::read_to_string(Path::new(&out).join(name)).expect("readable");
+    assert!(read("report.html").contains(reason), "the report says what is left out");
+    assert!(read("small.md").contains("too many") && read("small.md").contains("| pipeline |"));
+    let records = record::read(&Path::new(&out).join("records.jsonl")).expect("readable").records;
+    let pipelines: Vec<_> = records.iter().map(|r| (r.variant.as_str(), r.pipeline.as_str())).collect();
+    assert_eq!(pipelines, [("acrsm", "acrsm"), ("acrsm", "acrsm"), ("ruled", "ruled"), ("plain", "acrsm"), ("plain", "acrsm")]);
+    assert_eq!(records[0].metrics, records[2].metrics, "the same nodes and values, the same picture");
+    // Without the rule, only what it left out is done.
+    fs::write(folder.path().join("ruled.ron"), ruled("")).expect("writable");
+    run(&[]).expect(0).says(&["6 of 6 runs have records (5 were there already)"]);
+    assert!(!read("report.html").contains("too many"));
+    fs::write(folder.path().join("small.ron"), sweep.replace("\"acrsm\", \"ruled.ron\"", "\"acrms\"")).expect("writable");
+    run(&[]).expect(1).says(&["small.ron:2", "did you mean `acrsm`"]);
+    fs::write(folder.path().join("small.ron"), "Sweep(doc: \"?\", scenes: [\"cornell\"])").expect("writable");
+    run(&[]).expect(1).says(&["the sweep names no pipeline", "add `pipelines:"]);
+    fs::write(folder.path().join("ruled.ron"), ruled("(when: AtLeast(\"tiles\", 1), because: \"none will do\")")).expect("writable");
+    fs::write(folder.path().join("small.ron"), "Sweep(doc: \"?\", pipelines: [\"ruled.ron\"], scenes: [\"cornell\"])").expect("writable");
+    manylight(&["check", &file]).expect(0);
+    run(&[]).expect(1).says(&["every run of the sweep `small` is refused", "none will do", "ruled.ron:1"]);
+}
+
+/// Every pipeline of `pipelines/` but the one that makes the references.
+#[test]
+fn the_sweep_of_systems_has_them_all() {
+    let stems = |folder: &str| -> BTreeSet<String> {
+        let files = fs::read_dir(root().join(folder)).expect("readable").map(|entry| entry.expect("entry").path());
+        files.filter(|path| path.is_file()).map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned()).collect()
+    };
+    let listed = manylight(&["sweep", "systems", "--list", "--out", "unused"]).expect(0).stdout;
+    let runs: BTreeSet<&str> = listed.lines().filter_map(|line| line.split([' ', ',']).next()).collect();
+    for system in stems("pipelines").iter().filter(|name| *name != "reference") {
+        assert!(runs.contains(system.as_str()), "add `{system}` to `pipelines` in pipelines/sweeps/systems.ron");
+    }
+}
+
 /// A sequence is compared with a reference of each time, and its light goes where the sweep says.
 #[test]
 fn sequences_follow_the_path_of_the_light() {

@@ -13,6 +13,8 @@ pub struct Sheet {
     pub metric: String,
     /// The columns of tables, by name.
     pub metrics: Vec<String>,
+    /// Runs that make no sense and have no records, each with the reason.
+    pub refused: Vec<(String, String)>,
     /// What the records should bear out.
     pub claims: Vec<Claim>,
     /// Tables of a paper.

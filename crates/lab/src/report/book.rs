@@ -7,7 +7,7 @@ use super::{
     figures::{self, Figure},
     heading::Heading,
     papers,
-    study::{EMPTY, Study},
+    study::{EMPTY, REFUSED, Study},
     table::escape,
     tables,
 };
@@ -53,6 +53,11 @@ pub fn markdown(sheet: &Sheet, records: &[Record]) -> BookPage {
         for figure in figures::stages(&study, group) {
             page.figure(sheet, &figure);
         }
+    }
+    if !sheet.refused.is_empty() {
+        page.paragraph("## Left out");
+        let lines = sheet.refused.iter().map(|(run, reason)| format!("- {}: {}", escape(run), escape(reason)));
+        page.paragraph(&format!("{REFUSED}\n\n{}", lines.collect::<Vec<_>>().join("\n")));
     }
     let papers: Vec<_> = sheet.papers.iter().flat_map(|paper| papers::tables(&study, paper)).collect();
     for (title, table) in &papers {

@@ -9,7 +9,7 @@ use super::{
     names::{Metric, metric},
     papers,
     pictures::{self, Load},
-    study::{EMPTY, Group, Study},
+    study::{EMPTY, Group, REFUSED, Study},
     tables,
     text::printable,
 };
@@ -74,6 +74,7 @@ fn sections(study: &Study<'_>, load: Load<'_>) -> Vec<Section> {
     add("time", "Over scene time", groups().filter_map(|g| sequence(study, g)).collect());
     add("pictures", "Pictures", groups().filter_map(|g| titled(g, pictures::grid(study, g, load))).collect());
     add("papers", "Beside the papers", papers_of(study));
+    add("refused", "Left out", refused(study).into_iter().collect());
     let metrics = study.metrics();
     let runs = |g| titled(g, Some(tables::runs(study, g, &metrics).html()));
     add("runs", "All runs", groups().filter_map(runs).chain((!study.records.is_empty()).then(|| explained(study, &metrics))).collect());
@@ -125,6 +126,11 @@ fn explained(study: &Study<'_>, metrics: &[&str]) -> Markup {
 fn claims_of(study: &Study<'_>, group: &Group<'_>) -> Option<Markup> {
     let verdicts = claims::verdicts(study, group);
     (!verdicts.is_empty()).then(|| html! { ul { @for verdict in &verdicts { li { (verdict) } } } })
+}
+
+fn refused(study: &Study<'_>) -> Option<Markup> {
+    let refused = &study.sheet.refused;
+    (!refused.is_empty()).then(|| html! { p { (REFUSED) } ul { @for (run, reason) in refused { li { (run) ": " (reason) } } } })
 }
 
 fn papers_of(study: &Study<'_>) -> Vec<Markup> {

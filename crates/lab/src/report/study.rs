@@ -14,6 +14,8 @@ use crate::{
 
 /// What is said instead of a report without records.
 pub(super) const EMPTY: &str = "There are no records: the sweep has not run, or none of its runs has ended.";
+/// What is said above the runs that are left out.
+pub(super) const REFUSED: &str = "The pipelines refuse these runs:";
 /// Runs named in one sentence at most.
 const NAMED: usize = 4;
 
@@ -23,6 +25,8 @@ pub(super) struct Study<'a> {
     pub records: &'a [Record],
     /// In the order of their first runs.
     pub variants: Vec<&'a str>,
+    /// Number of pipelines.
+    pub pipelines: usize,
     /// Short name of each run, beside the scene and the size.
     pub labels: Vec<String>,
     /// The stages of all runs: one colour each in all plots.
@@ -56,7 +60,16 @@ impl<'a> Study<'a> {
                 None => groups.push(Group { scene: &record.scene.name, size: record.size, runs: vec![index] }),
             }
         }
-        Self { sheet, records, variants: variants.into_iter().collect(), labels: labels(records), stages: all_stages(records), groups }
+        let pipelines = records.iter().map(|r| r.pipeline.as_str()).collect::<IndexSet<_>>().len();
+        Self {
+            sheet,
+            records,
+            variants: variants.into_iter().collect(),
+            pipelines,
+            labels: labels(records),
+            stages: all_stages(records),
+            groups,
+        }
     }
 
     /// What the sweep asks, paragraph by paragraph.

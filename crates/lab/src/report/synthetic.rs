@@ -62,6 +62,7 @@ pub fn sweep() -> (Sheet, Vec<Record>) {
         axis: Axis::Frame,
         metric: "relative_rmse".into(),
         metrics: vec!["relative_rmse".into(), "energy_ratio".into()],
+        refused: Vec::new(),
         claims: Vec::new(),
         papers: vec![Paper { source: "[VAL] table 1".into(), unit: "ms".into(), values }],
         curves: vec![Curve {

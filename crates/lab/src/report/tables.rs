@@ -17,15 +17,18 @@ pub(super) fn front_note(study: &Study<'_>) -> String {
     format!("● is on the Pareto front of {error} and {time}: no other run is at least as good in both and better in one.")
 }
 
-/// Errors and costs of the runs of a group; the Pareto front of time and error is marked.
+/// Errors and costs of the runs of a group; the Pareto front of time and error is marked. Where pipelines are compared, they have a column.
 pub(super) fn runs(study: &Study<'_>, group: &Group<'_>, metrics: &[&str]) -> Table {
     let front = study.front(group);
     let mut columns = vec![Column::text("run"), Column::text("front")];
+    let systems = study.pipelines > 1;
+    columns.extend(systems.then(|| Column::text("pipeline")));
     columns.extend(metrics.iter().map(|name| Column::number(metric(name).title)));
     columns.extend(["frame (ms)", "95th percentile (ms)", "until picture (ms)", "memory (MiB)"].map(Column::number));
     let row = |&run: &usize| {
         let record = &study.records[run];
         let mut row = vec![study.labels[run].clone(), if front.contains(&run) { "●" } else { "" }.to_owned()];
+        row.extend(systems.then(|| record.pipeline.clone()));
         row.extend(metrics.iter().map(|name| maybe(record.metrics.get(*name).copied())));
         let times = &record.times;
         row.extend([times.frame(), times.frame_summary().p95, times.until_picture, record.memory as f64 / MIB].map(number));

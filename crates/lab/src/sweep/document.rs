@@ -27,7 +27,7 @@ pub struct Sweep {
     pub source: Arc<Source>,
     /// The question, in a sentence or two.
     pub doc: String,
-    /// What is compared, in document order; at least one.
+    /// What is compared, in document order, the pipelines that stand for themselves first; at least one.
     pub variants: Vec<Variant>,
     /// Knobs of all variants; each entry is crossed with the others.
     pub vary: Vec<Zip>,
@@ -153,8 +153,10 @@ impl MaskUse {
 
 const SWEEP: Shape = Shape {
     what: "Sweep",
-    required: &["doc", "variants", "scenes"],
+    required: &["doc", "scenes"],
     optional: &[
+        "pipelines",
+        "variants",
         "vary",
         "sizes",
         "seeds",
@@ -233,7 +235,11 @@ fn read_sweep(reader: &mut Reader, tree: &Tree, small: bool) -> Option<Sweep> {
     match &tree.kind {
         Kind::Record(Some(name), _) | Kind::Tuple(Some(name), _) if name.text == "Sweep" => {}
         _ => {
-            reader.expected(tree, "`Sweep(…)`", "a sweep has the form Sweep(doc: …, variants: {…}, scenes: […])");
+            reader.expected(
+                tree,
+                "`Sweep(…)`",
+                "a sweep has the form Sweep(doc: …, variants: {…}, scenes: […]) or Sweep(doc: …, pipelines: […], scenes: […])",
+            );
             return None;
         }
     }
@@ -246,7 +252,12 @@ fn read_sweep(reader: &mut Reader, tree: &Tree, small: bool) -> Option<Sweep> {
         extent
     });
     let reference = read_reference(reader, &fields);
-    let variants = fields.get("variants").map(|tree| read_variants(reader, tree)).unwrap_or_default();
+    let mut variants = fields.get("pipelines").map(|tree| read_pipelines(reader, tree)).unwrap_or_default();
+    variants.extend(fields.get("variants").map(|tree| read_variants(reader, tree)).unwrap_or_default());
+    if fields.get("pipelines").is_none() && fields.get("variants").is_none() {
+        let help = "add `pipelines: [\"acrsm\", …]`, or `variants: {\"name\": (pipeline: \"acrsm\", set: {…})}`";
+        reader.error(&head(tree), "the sweep names no pipeline: nothing would run", help);
+    }
     let own = |name: &str| Spanned { text: name.to_owned(), span: Span::new(&reader.source, head(tree)) };
     let (image, metric, component) = (own("indirect"), own("relative_mean_absolute_error"), own("one_bounce"));
     let text = |reader: &mut Reader, name: &str| fields.get(name).and_then(|t| reader.text(t, "a name in quotes"));
@@ -397,6 +408,17 @@ fn read_mask(reader: &mut Reader, tree: &Tree) -> Option<MaskUse> {
         }
     };
     Some(MaskUse { resource: resource?, channel, condition })
+}
+
+/// A variant of each pipeline, as it is.
+fn read_pipelines(reader: &mut Reader, tree: &Tree) -> Vec<Variant> {
+    not_empty(reader, tree, "pipelines");
+    let names: Vec<Spanned> = reader.list(tree, "pipelines").iter().filter_map(|tree| reader.text(tree, "a pipeline in quotes")).collect();
+    let variant = |pipeline: Spanned| {
+        let name = Spanned { text: stem(&pipeline.text), span: pipeline.span.clone() };
+        Variant { name, pipeline, set: Vec::new(), vary: Vec::new(), frames: None, image: None }
+    };
+    names.into_iter().map(variant).collect()
 }
 
 fn read_variants(reader: &mut Reader, tree: &Tree) -> Vec<Variant> {

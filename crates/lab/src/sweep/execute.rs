@@ -14,6 +14,7 @@ use super::{
     document::Sweep,
     plan::{Run, shard},
     prepare::Prepared,
+    refused,
     run::Bench,
 };
 use crate::{
@@ -70,7 +71,7 @@ pub struct Outcome {
     pub missing: usize,
 }
 
-/// Does every run that has no record of the same inputs yet. Without a part given, all records come to lie in [`RECORDS`], those of parts
+/// Does every run that has no record of the same inputs yet and is not refused. Without a part given, all records come to lie in [`RECORDS`], those of parts
 /// as well.
 ///
 /// # Errors
@@ -80,6 +81,7 @@ pub fn execute(gpu: &Gpu, prepared: &Prepared, options: Options<'_>, on: &mut dy
     fs::create_dir_all(options.out).map_err(|e| FileError::write(options.out, &e))?;
     let file = options.file();
     let _lock = lock(&file)?;
+    refused::keep(options.out, &prepared.sweep, &prepared.refused)?;
     let mut bench = Bench { gpu, prepared, out: options.out, cache: options.cache, references: HashMap::new() };
     let mut inputs = HashMap::new();
     for run in &prepared.runs {

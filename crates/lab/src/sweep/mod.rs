@@ -1,6 +1,6 @@
 //! Sweeps: one document, many runs, a record each.
 //!
-//! `document` reads the RON, `check` compares it with pipelines and scenes, `plan` lists the runs, `reference` makes or finds what they are
+//! `document` reads the RON, `check` compares it with pipelines and scenes, `plan` lists the runs, `refused` keeps those that make no sense, `reference` makes or finds what they are
 //! compared with, `run` does one run, [`execute`] all of them and keeps what is done.
 
 mod check;
@@ -10,6 +10,7 @@ mod extras;
 mod plan;
 mod prepare;
 mod reference;
+mod refused;
 mod run;
 
 use thiserror::Error;
@@ -22,6 +23,7 @@ pub use document::{Knob, MaskUse, PathTraced, SceneUse, Sequence, Sweep, Variant
 pub use execute::{Event, Options, Outcome, RECORDS, collect, execute};
 pub use plan::{Run, shard};
 pub use prepare::{Prepared, prepare};
+pub use refused::{Refused, refused};
 
 use crate::{files::FileError, metrics::CompareError};
 

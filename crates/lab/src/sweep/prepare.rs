@@ -19,6 +19,7 @@ use super::{
     document::Sweep,
     plan::Run,
     reference::{self, Reference, Task},
+    refused::Refused,
     run::STANDARD_ERROR,
 };
 
@@ -30,8 +31,10 @@ const MOST_FAULTS: usize = 20;
 pub struct Prepared {
     /// The sweep.
     pub sweep: Sweep,
-    /// Its runs.
+    /// Its runs, without those that are refused.
     pub runs: Vec<Run>,
+    /// Runs that their pipelines refuse.
+    pub refused: Vec<Refused>,
     /// What was mended in scenes, and lights that a variant leaves out.
     pub warnings: Diagnostics,
     /// By variant.
@@ -53,7 +56,7 @@ pub(super) struct LoadedScene {
 /// Loads pipelines and scenes and plans every run; needs no GPU. Faults are those of all of them.
 ///
 /// # Errors
-/// Faults of the sweep, of its pipelines and scenes, and of runs that cannot be planned.
+/// Faults of the sweep, of its pipelines and scenes, and of runs that cannot be planned; every run is refused.
 pub fn prepare(sweep: Sweep, library: &Library, find: &SceneFinder<'_>) -> Result<Prepared, SweepError> {
     let (registry, faults) = load_registry(library);
     let mut out = sweep.check(library, &registry, find);
@@ -81,8 +84,10 @@ pub fn prepare(sweep: Sweep, library: &Library, find: &SceneFinder<'_>) -> Resul
     let open = |name: &Path| Documents::with(library.clone(), registry.clone(), faults.clone(), name);
     let documents = sweep.variants.iter().map(|v| open(&sweep.beside(&v.pipeline.text))).collect::<Result<Vec<_>, _>>()?;
     let (runs, reference) = (sweep.runs(), open(Path::new(REFERENCE))?);
-    let mut prepared = Prepared { sweep, runs, warnings: out, documents, scenes, reference, references: HashMap::new() };
-    prepared.warnings.extend(prepared.plan_all()?);
+    let mut prepared =
+        Prepared { sweep, runs, refused: Vec::new(), warnings: out, documents, scenes, reference, references: HashMap::new() };
+    let warnings = prepared.plan_all()?;
+    prepared.warnings.extend(warnings);
     prepared.read_references()?;
     Ok(prepared)
 }
@@ -105,12 +110,20 @@ impl Prepared {
         Task { documents: &self.reference, source, scene, size: run.size, what: &self.sweep.reference, time }
     }
 
-    /// Plans every run; returns what is worth a warning.
-    fn plan_all(&self) -> Result<Diagnostics, SweepError> {
+    /// Plans every run, and sets those apart that are refused; returns what is worth a warning.
+    fn plan_all(&mut self) -> Result<Diagnostics, SweepError> {
         let (mut faults, mut warnings) = (Diagnostics::default(), Diagnostics::default());
-        for run in &self.runs {
+        let mut refusals = Diagnostics::default();
+        for run in std::mem::take(&mut self.runs) {
             let scene = &self.scenes[run.scene].scene;
-            match self.documents[run.variant].plan(&plan_input(&self.settings(run), scene)) {
+            let (documents, input) = (&self.documents[run.variant], plan_input(&self.settings(&run), scene));
+            let own = documents.refusals(&input);
+            if !own.is_empty() {
+                self.refused.push(Refused::new(&self.sweep, &run.name, &own));
+                refusals.extend(own);
+                continue;
+            }
+            match documents.plan(&input) {
                 Ok(plan) => {
                     let wanted =
                         std::iter::once(self.sweep.image_of(run.variant)).chain(self.sweep.mask.as_ref().map(|mask| &mask.resource));
@@ -133,6 +146,11 @@ impl Prepared {
             if faults.0.len() > MOST_FAULTS {
                 break;
             }
+            self.runs.push(run);
+        }
+        if self.runs.is_empty() && faults.is_empty() {
+            faults.push(Diagnostic::error_nowhere(format!("every run of the sweep `{}` is refused", self.sweep.name)));
+            faults.extend(refusals.0.into_iter().next().map(Diagnostics::from).unwrap_or_default());
         }
         if faults.is_empty() { Ok(warnings) } else { Err(faults.into()) }
     }

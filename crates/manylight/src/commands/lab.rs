@@ -18,7 +18,7 @@ use manylight::{
         record::Record,
         report,
         sheet::Sheet,
-        sweep::{Event, Options, Outcome, Prepared, Sweep, SweepError, execute, prepare},
+        sweep::{Event, Options, Outcome, Prepared, Refused, Sweep, SweepError, execute, prepare},
     },
     library,
 };
@@ -51,10 +51,13 @@ pub fn find_scene(library: &Library) -> impl Fn(&str) -> Result<SceneSource, Str
     |name| library::scene(library, name).map_err(|fault| fault.to_string())
 }
 
-/// Loads everything that a sweep names.
+/// Loads everything that a sweep names, and tells what of it is refused.
 pub fn load(sweep: Sweep, library: &Library) -> Result<Prepared, Fault> {
     let prepared = prepare(sweep, library, &find_scene(library)).map_err(of_sweep)?;
     super::warn(&prepared.warnings);
+    for Refused { run, reason, .. } in &prepared.refused {
+        note(&format!("left out: {run}: {reason}"));
+    }
     Ok(prepared)
 }
 
@@ -119,24 +122,26 @@ fn in_words(time: Duration) -> String {
     if seconds < 90 { format!("{seconds} s") } else { format!("{} min", (seconds + 30) / 60) }
 }
 
-/// What the report says besides the records.
-pub fn sheet(sweep: &Sweep) -> Sheet {
-    Sheet {
+/// What the report says besides the records of a folder.
+pub fn sheet(sweep: &Sweep, out: &Path) -> Result<Sheet, Fault> {
+    let refused = manylight::lab::sweep::refused(out, sweep).map_err(of_file)?;
+    Ok(Sheet {
         name: sweep.name.clone(),
         doc: sweep.doc.clone(),
         axis: sweep.axis,
         metric: sweep.metric.text.clone(),
         metrics: sweep.metrics.iter().map(|metric| metric.text.clone()).collect(),
+        refused: refused.into_iter().map(|refused| (refused.run, refused.reason)).collect(),
         claims: sweep.claims.iter().map(|(claim, _)| claim.clone()).collect(),
         papers: sweep.papers.clone(),
         curves: sweep.curves.clone(),
-    }
+    })
 }
 
 /// Writes table and report beside the records; returns the report's path.
 pub fn write_report(sweep: &Sweep, records: &[Record], out: &Path) -> Result<PathBuf, Fault> {
     write_text(&out.join("runs.csv"), &report::csv(records)).map_err(of_file)?;
-    let page = report::html(&sheet(sweep), records, &|name| fs::read(out.join(name)).ok());
+    let page = report::html(&sheet(sweep, out)?, records, &|name| fs::read(out.join(name)).ok());
     let file = out.join("report.html");
     write_text(&file, &page).map_err(of_file)?;
     Ok(file)

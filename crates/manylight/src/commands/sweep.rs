@@ -9,7 +9,7 @@ use manylight::{
     lab::{
         record::Record,
         report,
-        sweep::{Event, Outcome, SceneUse, Sweep, collect, shard},
+        sweep::{Event, Outcome, SceneUse, Sweep, collect, refused, shard},
     },
     library,
 };
@@ -72,7 +72,8 @@ fn report_only(library: &Library, sweep: &Sweep, args: &SweepArgs) -> Result<(),
     if faults.has_errors() {
         return Err(faults.into());
     }
-    let runs = sweep.runs();
+    let refused = refused(&args.out, sweep).map_err(of_file)?;
+    let runs = sweep.runs().len() - refused.len();
     let records = collect(&args.out, sweep, &mut |event| {
         if let Event::Damaged(damage) = event {
             note(&damage.to_string());
@@ -80,13 +81,13 @@ fn report_only(library: &Library, sweep: &Sweep, args: &SweepArgs) -> Result<(),
     })
     .map_err(of_file)?;
     let file = write(sweep, &records, args)?;
-    super::print(&format!("{} of {} runs have records: {}\n", records.len(), runs.len(), file.display()))
+    super::print(&format!("{} of {runs} runs have records: {}\n", records.len(), file.display()))
 }
 
 /// Writes the report, and the page of a book where that is asked for.
 fn write(sweep: &Sweep, records: &[Record], args: &SweepArgs) -> Result<PathBuf, Fault> {
     if let Some(folder) = &args.markdown {
-        let page = report::markdown(&lab::sheet(sweep), records);
+        let page = report::markdown(&lab::sheet(sweep, &args.out)?, records);
         fs::create_dir_all(folder).map_err(|e| of_file(FileError::write(folder, &e)))?;
         let text = (format!("{}.md", sweep.name), page.text);
         for (name, text) in page.figures.iter().chain([&text]) {
