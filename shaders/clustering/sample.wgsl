@@ -9,6 +9,7 @@
 #import common::octahedral::unpack_unit
 #import common::radiometry::max_component
 #import common::random::{halton_23, hash3, unit_float}
+#import common::tiles::point_of_light
 #import common::warp::warp_to_texel
 
 struct Params {
@@ -26,14 +27,6 @@ struct Params {
 @group(0) @binding(6) var<uniform> params: Params;
 @group(0) @binding(7) var<storage, read_write> clusters: array<Cluster>;
 
-// Index in the sequence of light `c` of `count`: the lights of a tile (c mod n²) are a run of it. Taken in turn they would be all in one stripe of the
-// map: every 9th point of a sequence in base 3 has the same first two digits.
-fn order(c: u32, count: u32) -> u32 {
-    let period = params.tiles * params.tiles;
-    let tile = c % period;
-    return tile * (count / period) + min(tile, count % period) + c / period;
-}
-
 // A point that is uniform over all frames, the same for all lights of one (Cranley and Patterson 1976).
 fn rotation() -> vec2f {
     return vec2f(unit_float(hash3(frame.index, frame.seed, 1u)), unit_float(hash3(frame.index, frame.seed, 2u)));
@@ -47,7 +40,7 @@ fn sample(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     // Point 0 is the corner (0, 0): start at 1.
-    var point = halton_23(1u + order(c, count));
+    var point = halton_23(1u + point_of_light(c, count, params.tiles));
     if params.jitter != 0u {
         point = fract(point + rotation());
     }
