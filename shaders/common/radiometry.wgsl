@@ -63,6 +63,14 @@ fn disk_form_factor(cos_receiver: f32, cos_emitter: f32, d2: f32, area: f32) -> 
     return max(cos_receiver, 0.0) * max(cos_emitter, 0.0) / max(PI * d2 + area, 1e-30);
 }
 
+// What a diffuse receiver reflects of indirect light, W/(m² sr), from its irradiance and, in alpha, the luminance of that without shadows; alpha of the
+// result: share that shadows leave. Negative lights [SOI] may take away more than there is: the sum over all lights is clamped here, once, after
+// merging and filtering, so that what they take too much in one tile is not lost for the others.
+fn reflected_light(albedo: vec3f, light: vec4f) -> vec4f {
+    let visible = select(1.0, saturate(luminance(light.rgb) / max(light.a, 1e-30)), light.a > 0.0);
+    return vec4f(albedo / PI * max(light.rgb, vec3f(0.0)), visible);
+}
+
 // Lambert and Blinn between two unit directions away from the surface, 1/sr. The lobe is normalised so that the energy it reflects
 // does not depend on the exponent.
 fn lambert_blinn(albedo: vec3f, specular: vec3f, shininess: f32, normal: vec3f, to_light: vec3f, to_viewer: vec3f) -> vec3f {

@@ -7,7 +7,7 @@
 
 #import common::scene::SceneInfo
 #import common::octahedral::unpack_unit
-#import common::radiometry::{PI, luminance}
+#import common::radiometry::reflected_light
 #import common::tiles::split_of_pixel
 
 struct Params {
@@ -114,7 +114,5 @@ fn filter_light(@builtin(global_invocation_id) id: vec3u) {
     } else {
         light = box_filter(r, size);
     }
-    let visible = select(1.0, saturate(luminance(light.rgb) / max(light.a, 1e-30)), light.a > 0.0);
-    let albedo = textureLoad(gbuffer_albedo, id.xy, 0).rgb;
-    textureStore(indirect, id.xy, vec4f(albedo / PI * light.rgb, visible));
+    textureStore(indirect, id.xy, reflected_light(textureLoad(gbuffer_albedo, id.xy, 0).rgb, light));
 }
