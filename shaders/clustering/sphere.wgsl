@@ -141,6 +141,7 @@ fn place(@builtin(global_invocation_id) id: vec3u) {
     let at = view_uv(scene_light_view, scene_light_view.origin + direction).xy * vec2f(size);
     // At the rim of the cone the projection may round to the texel beyond the map.
     let texel = min(vec2u(max(at, vec2f(0.0))), size - 1u);
+    light.texel = at;
     let flux = textureLoad(rsm_flux, texel, 0);
     if max_component(flux.rgb) > 0.0 {
         let ray = pixel_direction(scene_light_view, texel, size);
@@ -151,7 +152,6 @@ fn place(@builtin(global_invocation_id) id: vec3u) {
         light.state = CLUSTER_ACTIVE;
         light.position = scene_light_view.origin + ray * d;
         light.normal = unpack_unit(textureLoad(rsm_normal, texel, 0).x);
-        light.texel = at;
         light.importance = 1.0;
         light.flux = flux.rgb * texels;
         light.area = texel_area(solid_angle, d, -dot(light.normal, ray));

@@ -13,6 +13,7 @@ mod reference;
 mod renders;
 mod samples;
 mod shadow_maps;
+mod second_order;
 mod support;
 mod sweeps;
 mod twin;
