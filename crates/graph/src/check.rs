@@ -58,13 +58,14 @@ pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
         attempt(&values, features, when, Severity::Error);
     }
     // Without knowing what is refused, all that would follow from it would be told.
-    let tried = pipeline.params.iter().filter(|_| !linked.refusals_unclear);
-    for (name, param) in tried {
+    let is_preset = !pipeline.set.is_empty();
+    // The ends of ranges are for the values that a pipeline has by itself; a preset is one choice of them.
+    let is_tried = |kind: &ParamKind| !linked.refusals_unclear && !(is_preset && matches!(kind, ParamKind::Int { .. }));
+    for (name, param) in pipeline.params.iter().filter(|(_, param)| is_tried(&param.kind)) {
         let current = values.get(name).cloned();
         // The end of a range may be too much beside another parameter's value (memory, say), and a preset may set what another option needs:
         // that is good to know, and no fault of the pipeline.
-        let worst =
-            if matches!(param.kind, ParamKind::Int { .. }) || !pipeline.set.is_empty() { Severity::Warning } else { Severity::Error };
+        let worst = if is_preset || matches!(param.kind, ParamKind::Int { .. }) { Severity::Warning } else { Severity::Error };
         for value in variants(&param.kind).into_iter().filter(|v| Some(v) != current.as_ref()) {
             let when = format!("when `{name}` is `{value}`");
             let mut changed = values.clone();
