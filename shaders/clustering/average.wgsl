@@ -3,10 +3,9 @@
 // blending, as in the paper, has not). Means of normals may cancel: then the old normal stays and the frames are counted.
 // What bounds it: reads of the map, the area of all rectangles together.
 
-#import common::scene::View
-#import common::view::pixel_direction
+#import common::rsm::{texel_ray, texel_position, texel_area, Cell, cell_of_texel, in_cell}
 #import common::octahedral::unpack_unit
-#import common::cluster::{Cluster, texel_area}
+#import common::cluster::Cluster
 #import common::radiometry::PI
 
 @group(0) @binding(0) var<storage, read> clusters_warped: array<Cluster>;
@@ -16,8 +15,7 @@
 @group(0) @binding(4) var rsm_normal: texture_2d<u32>;
 @group(0) @binding(5) var rsm_distance: texture_2d<f32>;
 @group(0) @binding(6) var importance: texture_2d<f32>;
-@group(0) @binding(7) var<uniform> scene_light_view: View;
-@group(0) @binding(8) var<storage, read_write> clusters: array<Cluster>;
+@group(0) @binding(7) var<storage, read_write> clusters: array<Cluster>;
 
 override flux_is_sum: bool;
 override area_is_circle: bool;
@@ -43,8 +41,13 @@ var<workgroup> nearest_distance: array<f32, LANES>;
 var<workgroup> nearest_texel: array<u32, LANES>;
 var<workgroup> farthest: array<f32, LANES>;
 
-fn texel_position(texel: vec2u) -> vec3f {
-    return scene_light_view.origin + pixel_direction(scene_light_view, texel, textureDimensions(cluster_map)) * textureLoad(rsm_distance, texel, 0).x;
+fn position_of(texel: vec2u) -> vec3f {
+    return texel_position(texel, textureDimensions(cluster_map), textureLoad(rsm_distance, texel, 0).x);
+}
+
+// Whether a texel is cluster `c`'s own: of a view that has no cluster it only gets the flux.
+fn is_own(texel: vec2u, c: u32, cell: Cell) -> bool {
+    return textureLoad(cluster_map, texel, 0).x == c && in_cell(cell, vec2f(texel));
 }
 
 @compute @workgroup_size(128)
@@ -56,21 +59,25 @@ fn average(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     let extent = select(vec2u(0u), high - low + 1u, all(low <= high));
     let total = extent.x * extent.y;
 
+    let size = textureDimensions(cluster_map);
+    let cell = cell_of_texel(vec2u(cluster.texel), size);
     var sum: Sum;
     for (var i = lane; i < total; i += LANES) {
         let texel = low + vec2u(i % extent.x, i / extent.x);
         if textureLoad(cluster_map, texel, 0).x != c {
             continue;
         }
-        let flux = textureLoad(rsm_flux, texel, 0);
+        sum.flux += textureLoad(rsm_flux, texel, 0).rgb;
+        if !is_own(texel, c, cell) {
+            continue;
+        }
         let normal = unpack_unit(textureLoad(rsm_normal, texel, 0).x);
-        let direction = pixel_direction(scene_light_view, texel, textureDimensions(cluster_map));
+        let ray = texel_ray(texel, size);
         let d = textureLoad(rsm_distance, texel, 0).x;
-        sum.position += scene_light_view.origin + direction * d - cluster.position;
-        sum.area += texel_area(flux.a, d, -dot(normal, direction));
+        sum.position += ray.origin + ray.direction * d - cluster.position;
+        sum.area += texel_area(texel, size, d, -dot(normal, ray.direction));
         sum.normal += normal;
         sum.importance += textureLoad(importance, texel, 0).x;
-        sum.flux += flux.rgb;
         sum.count += 1u;
         sum.texel += vec2f(texel) + 0.5 - cluster.texel;
     }
@@ -100,8 +107,8 @@ fn average(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     var best_texel = 0u;
     for (var i = lane; i < total; i += LANES) {
         let texel = low + vec2u(i % extent.x, i / extent.x);
-        if textureLoad(cluster_map, texel, 0).x == c {
-            let offset = texel_position(texel) - mean_position;
+        if is_own(texel, c, cell) {
+            let offset = position_of(texel) - mean_position;
             let d2 = dot(offset, offset);
             if d2 < best {
                 best = d2;
@@ -128,14 +135,14 @@ fn average(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
 
     var centre_position = mean_position;
     if snap && whole.count > 0u {
-        centre_position = texel_position(centre);
+        centre_position = position_of(centre);
     }
     var radius_2 = 0.0;
     if area_is_circle {
         for (var i = lane; i < total; i += LANES) {
             let texel = low + vec2u(i % extent.x, i / extent.x);
-            if textureLoad(cluster_map, texel, 0).x == c {
-                let offset = texel_position(texel) - centre_position;
+            if is_own(texel, c, cell) {
+                let offset = position_of(texel) - centre_position;
                 radius_2 = max(radius_2, dot(offset, offset));
             }
         }
@@ -169,6 +176,6 @@ fn average(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     cluster.importance = whole.importance / n;
     cluster.area = select(whole.area, PI * radius_2, area_is_circle);
     // The papers read the flux at the centre and let each texel count as much.
-    cluster.flux = select(textureLoad(rsm_flux, min(vec2u(cluster.texel), textureDimensions(cluster_map) - 1u), 0).rgb * n, whole.flux, flux_is_sum);
+    cluster.flux = select(textureLoad(rsm_flux, min(vec2u(cluster.texel), size - 1u), 0).rgb * n, whole.flux, flux_is_sum);
     clusters[c] = cluster;
 }

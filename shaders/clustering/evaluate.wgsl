@@ -6,6 +6,7 @@
 
 #import common::scene::Frame
 #import common::cluster::{Cluster, CLUSTER_ACTIVE, CLUSTER_RESEED, CLUSTER_PLACED}
+#import common::rsm::{cell_of_texel, in_cell}
 #import common::radiometry::{PI, max_component}
 #import common::random::{hash3, unit_float}
 
@@ -47,6 +48,11 @@ fn carry(@builtin(global_invocation_id) id: vec3u) {
     clusters_evaluated[c] = cluster;
 }
 
+// Whether two places of the map show the same view of a light: texels of others are no neighbours, however near in the map.
+fn of_one_view(a: vec2f, b: vec2f) -> bool {
+    return in_cell(cell_of_texel(vec2u(a), textureDimensions(rsm_flux)), b);
+}
+
 fn comparison_metric(c: u32, largest_area: f32) -> f32 {
     return clusters_evaluated[c].area / largest_area * clusters_evaluated[c].importance; // [ACRSM] eq. 4.6
 }
@@ -76,7 +82,7 @@ fn measure(@builtin(global_invocation_id) id: vec3u) {
             continue;
         }
         let offset = abs(clusters_evaluated[i].texel - clusters_evaluated[c].texel);
-        if max(offset.x, offset.y) <= f32(params.window) {
+        if max(offset.x, offset.y) <= f32(params.window) && of_one_view(clusters_evaluated[i].texel, clusters_evaluated[c].texel) {
             let d = comparison_metric(i, largest_area);
             sum += d;
             sum_of_squares += d * d;
@@ -108,7 +114,7 @@ fn place_near(c: u32) -> vec2f {
         let u = vec2f(unit_float(hash3(c, frame.index, 2u * i + 1u)), unit_float(hash3(c, frame.index, 2u * i + 2u)));
         let offset = radius * sqrt(u.x) * vec2f(cos(2.0 * PI * u.y), sin(2.0 * PI * u.y));
         let texel = clusters_evaluated[c].texel + offset;
-        if all(texel >= vec2f(0.0)) && all(texel < size) && max_component(textureLoad(rsm_flux, vec2u(texel), 0).rgb) > 0.0 {
+        if all(texel >= vec2f(0.0)) && all(texel < size) && of_one_view(texel, clusters_evaluated[c].texel) && max_component(textureLoad(rsm_flux, vec2u(texel), 0).rgb) > 0.0 {
             return texel;
         }
     }

@@ -1,10 +1,11 @@
 // Mapping of RSM texels to clusters. [ACRSM] 4.6, 5.3.1.
 // Differs from the paper: texels look for clusters instead of clusters drawing squares over texels; a group of 16×16 texels first lists the clusters
 // whose window reaches it, so the cost per texel is the number of windows that overlap there, and the result needs no depth test.
+// A cluster competes for texels of its own view of a light only; texels of a view without any cluster give their flux to the nearest of all.
 // Ties go to the lower index. What bounds it: k distance computations per texel with `exact`, texture reads otherwise.
 
-#import common::scene::{View, SceneInfo}
-#import common::view::pixel_direction
+#import common::scene::SceneInfo
+#import common::rsm::{texel_position, cell_of_texel, in_cell}
 #import common::octahedral::unpack_unit
 #import common::cluster::{Cluster, CLUSTER_ACTIVE, NO_CLUSTER, MAX_CLUSTERS}
 #import common::metric::{Metric, cluster_distance}
@@ -22,11 +23,10 @@ struct Params {
 @group(0) @binding(2) var rsm_normal: texture_2d<u32>;
 @group(0) @binding(3) var rsm_distance: texture_2d<f32>;
 @group(0) @binding(4) var importance: texture_2d<f32>;
-@group(0) @binding(5) var<uniform> scene_light_view: View;
-@group(0) @binding(6) var<uniform> scene_info: SceneInfo;
-@group(0) @binding(7) var<uniform> params: Params;
-@group(0) @binding(8) var cluster_map: texture_storage_2d<r32uint, write>;
-@group(0) @binding(9) var<storage, read_write> cluster_bounds: array<atomic<u32>>;
+@group(0) @binding(5) var<uniform> scene_info: SceneInfo;
+@group(0) @binding(6) var<uniform> params: Params;
+@group(0) @binding(7) var cluster_map: texture_storage_2d<r32uint, write>;
+@group(0) @binding(8) var<storage, read_write> cluster_bounds: array<atomic<u32>>;
 
 override mapping_is_exact: bool;
 override normal_distance_is_signed: bool;
@@ -81,11 +81,12 @@ fn assign(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group
         return;
     }
 
-    let position = scene_light_view.origin + pixel_direction(scene_light_view, id.xy, size) * textureLoad(rsm_distance, id.xy, 0).x;
+    let position = texel_position(id.xy, size, textureLoad(rsm_distance, id.xy, 0).x);
     let normal = unpack_unit(textureLoad(rsm_normal, id.xy, 0).x);
     let rho = textureLoad(importance, id.xy, 0).x;
     let metric = Metric(params.weight_position, params.weight_normal, params.weight_importance, max(scene_info.diagonal, 1e-30), normal_distance_is_signed);
     let texel = vec2f(id.xy) + 0.5;
+    let cell = cell_of_texel(id.xy, size);
     var best = NO_CLUSTER;
     var best_distance = 3.0e38;
     for (var word = 0u; word < (count + 31u) / 32u; word++) {
@@ -93,7 +94,7 @@ fn assign(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group
         while bits != 0u {
             let c = word * 32u + countTrailingZeros(bits);
             bits &= bits - 1u;
-            if !mapping_is_exact && !in_window(texel, clusters_warped[c].texel) {
+            if !in_cell(cell, clusters_warped[c].texel) || (!mapping_is_exact && !in_window(texel, clusters_warped[c].texel)) {
                 continue;
             }
             let d = cluster_distance(metric, clusters_warped[c].position, clusters_warped[c].normal, clusters_warped[c].importance, position, normal, rho);
@@ -104,16 +105,24 @@ fn assign(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group
         }
     }
     if best == NO_CLUSTER {
-        // No window holds it: the nearest of all takes its energy, and it is counted.
+        // No window holds it: the nearest of all takes its energy, one of its own view if there is any, and it is counted.
+        var foreign = NO_CLUSTER;
+        var foreign_distance = 3.0e38;
         for (var c = 0u; c < count; c++) {
             if clusters_warped[c].state == CLUSTER_ACTIVE {
                 let d = cluster_distance(metric, clusters_warped[c].position, clusters_warped[c].normal, clusters_warped[c].importance, position, normal, rho);
-                if d < best_distance {
-                    best = c;
-                    best_distance = d;
+                if in_cell(cell, clusters_warped[c].texel) {
+                    if d < best_distance {
+                        best = c;
+                        best_distance = d;
+                    }
+                } else if d < foreign_distance {
+                    foreign = c;
+                    foreign_distance = d;
                 }
             }
         }
+        best = select(best, foreign, best == NO_CLUSTER);
         atomicAdd(&cluster_bounds[arrayLength(&cluster_bounds) - 1u], 1u);
     }
     textureStore(cluster_map, id.xy, vec4u(best));

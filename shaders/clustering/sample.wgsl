@@ -3,9 +3,9 @@
 // of zero, and where fewer levels are warped texels of a cell are equally likely. Each point is a light: the same texel may be drawn twice.
 // Source: [ACRSM] 4.4, 4.5 for seeds and warping; [RSM] for texels as lights.
 
-#import common::cluster::{Cluster, CLUSTER_ACTIVE, texel_area}
-#import common::scene::{Frame, View}
-#import common::view::pixel_direction
+#import common::cluster::{Cluster, CLUSTER_ACTIVE}
+#import common::scene::Frame
+#import common::rsm::{texel_ray, texel_area}
 #import common::octahedral::unpack_unit
 #import common::radiometry::max_component
 #import common::random::{halton_23, hash3, unit_float}
@@ -23,9 +23,8 @@ struct Params {
 @group(0) @binding(2) var rsm_flux: texture_2d<f32>;
 @group(0) @binding(3) var rsm_normal: texture_2d<u32>;
 @group(0) @binding(4) var rsm_distance: texture_2d<f32>;
-@group(0) @binding(5) var<uniform> scene_light_view: View;
-@group(0) @binding(6) var<uniform> params: Params;
-@group(0) @binding(7) var<storage, read_write> clusters: array<Cluster>;
+@group(0) @binding(5) var<uniform> params: Params;
+@group(0) @binding(6) var<storage, read_write> clusters: array<Cluster>;
 
 // A point that is uniform over all frames, the same for all lights of one (Cranley and Patterson 1976).
 fn rotation() -> vec2f {
@@ -51,17 +50,17 @@ fn sample(@builtin(global_invocation_id) id: vec3u) {
     let flux = textureLoad(rsm_flux, min(texel, size - 1u), 0);
     var light = Cluster();
     if all(texel < size) && max_component(flux.rgb) > 0.0 {
-        let direction = pixel_direction(scene_light_view, texel, size);
+        let ray = texel_ray(texel, size);
         let d = textureLoad(rsm_distance, texel, 0).x;
         // How many texels it stands for: 1 / (N p_j).
         let texels = 1.0 / (f32(count) * warped.probability);
         light.state = CLUSTER_ACTIVE;
-        light.position = scene_light_view.origin + direction * d;
+        light.position = ray.origin + ray.direction * d;
         light.normal = unpack_unit(textureLoad(rsm_normal, texel, 0).x);
         light.texel = vec2f(texel) + 0.5;
         light.importance = textureLoad(importance, texel, 0).x;
         light.flux = flux.rgb * texels;
-        light.area = texel_area(flux.a, d, -dot(light.normal, direction)) * texels;
+        light.area = texel_area(texel, size, d, -dot(light.normal, ray.direction)) * texels;
         light.count = max(u32(round(texels)), 1u);
     }
     clusters[c] = light;

@@ -3,8 +3,7 @@
 // for this frame instead of giving it attributes of nothing.
 
 #import common::cluster::{Cluster, CLUSTER_IDLE, CLUSTER_ACTIVE, CLUSTER_RESEED, CLUSTER_PLACED}
-#import common::scene::View
-#import common::view::pixel_direction
+#import common::rsm::texel_position
 #import common::octahedral::unpack_unit
 #import common::radiometry::max_component
 #import common::warp::warp_to_texel
@@ -18,9 +17,8 @@ struct Params {
 @group(0) @binding(2) var rsm_flux: texture_2d<f32>;
 @group(0) @binding(3) var rsm_normal: texture_2d<u32>;
 @group(0) @binding(4) var rsm_distance: texture_2d<f32>;
-@group(0) @binding(5) var<uniform> scene_light_view: View;
-@group(0) @binding(6) var<uniform> params: Params;
-@group(0) @binding(7) var<storage, read_write> clusters_warped: array<Cluster>;
+@group(0) @binding(5) var<uniform> params: Params;
+@group(0) @binding(6) var<storage, read_write> clusters_warped: array<Cluster>;
 
 @compute @workgroup_size(64)
 fn warp(@builtin(global_invocation_id) id: vec3u) {
@@ -38,7 +36,7 @@ fn warp(@builtin(global_invocation_id) id: vec3u) {
         let flux = textureLoad(rsm_flux, texel, 0).rgb;
         if max_component(flux) > 0.0 && all(cluster.texel < vec2f(size)) {
             cluster.state = CLUSTER_ACTIVE;
-            cluster.position = scene_light_view.origin + pixel_direction(scene_light_view, texel, size) * textureLoad(rsm_distance, texel, 0).x;
+            cluster.position = texel_position(texel, size, textureLoad(rsm_distance, texel, 0).x);
             cluster.normal = unpack_unit(textureLoad(rsm_normal, texel, 0).x);
             cluster.flux = flux;
             cluster.importance = textureLoad(importance, texel, 0).x;

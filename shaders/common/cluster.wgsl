@@ -28,11 +28,3 @@ struct Cluster {
     cancelled: u32, // frames in a row in which the mean of its normals vanished and the old one was kept
     rank: u32, // while evaluating: 1 + its place among those to be merged or split, the worst first; 0: it fits
 }
-
-// A texel seen at a grazing angle stands for an area of solid angle × d² / cosθ: the cosine is kept from zero, which bounds the area at 50 times.
-const MIN_COSINE: f32 = 0.02;
-
-// Surface that a texel stands for, m²: `cosine` at the surface, towards the light.
-fn texel_area(solid_angle: f32, distance: f32, cosine: f32) -> f32 {
-    return solid_angle * distance * distance / max(cosine, MIN_COSINE);
-}

@@ -1,6 +1,6 @@
 // Light and its transport between surfaces. Units: W, W/sr, W/m², W/(m² sr), each for linear red, green, blue.
 
-#import common::scene::{Light, FALLOFF_COSINE, FALLOFF_SMOOTH, LIGHT_POINT, LIGHT_DIRECTIONAL}
+#import common::scene::{Light, FALLOFF_COSINE, FALLOFF_SMOOTH, LIGHT_SPOT, LIGHT_DIRECTIONAL}
 
 const PI: f32 = 3.14159265358979;
 
@@ -31,6 +31,14 @@ fn spot_falloff(light: Light, direction: vec3f) -> f32 {
     return t;
 }
 
+// Share of the strength that a light of any kind sends along `direction` (unit, away from the light).
+fn falloff(light: Light, direction: vec3f) -> f32 {
+    if light.kind != LIGHT_SPOT {
+        return 1.0;
+    }
+    return spot_falloff(light, direction);
+}
+
 // The light that arrives at a point if nothing is between.
 struct Arrival {
     to_light: vec3f, // unit
@@ -49,12 +57,8 @@ fn light_at(light: Light, position: vec3f) -> Arrival {
     let offset = light.position - position;
     let to_light = offset * inverseSqrt(max(dot(offset, offset), 1e-30));
     let spread = 1.0 / max(dot(offset, offset), LEAST_DISTANCE2);
-    var falloff = 1.0;
-    if light.kind != LIGHT_POINT {
-        falloff = spot_falloff(light, -to_light);
-    }
     // Rays are uniform in a spot light's whole cone; where none go, outside, there is no light that the density could weigh.
-    return Arrival(to_light, light.strength * (falloff * spread), light.ray_density * spread);
+    return Arrival(to_light, light.strength * (falloff(light, -to_light) * spread), light.ray_density * spread);
 }
 
 // Form factor from a disk of area `area` at distance² `d2` to a surface element, over the element's area: [ACRSM] eq. 5.5, after [WALLACE].

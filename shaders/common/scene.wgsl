@@ -1,12 +1,12 @@
 // Scene and frame data as Rust fills it (crate manylight-scene, module `gpu_data`); layouts are compared when a shader loads.
 
-// A pinhole camera or a light seen as one. World space, right-handed; all vectors have unit length.
+// A pinhole camera, or a light seen as a camera, whose rays may be parallel. World space, right-handed; all vectors have unit length.
 struct View {
-    clip_from_world: mat4x4f, // reverse z: 1 at `near`, 0 at infinity
-    origin: vec3f,
+    clip_from_world: mat4x4f, // reverse z: 1 at `near`, 0 at infinity; parallel rays: 1 where they start, 0 at `far`
+    origin: vec3f, // parallel rays: the middle of the square where they start
     near: f32,
     right: vec3f,
-    tan_half_x: f32, // tangent of half the horizontal field of view
+    tan_half_x: f32, // tangent of half the horizontal field of view; parallel rays: half the width of the picture, in the units of the world
     up: vec3f,
     tan_half_y: f32,
     forward: vec3f,
@@ -32,6 +32,15 @@ struct Light {
     radius: f32, // of a directional light's disk
     share: f32, // of the power of all lights: how probably a path tracer sends a ray from it
     ray_density: f32, // share over what its rays are spread over: solid angle, sr; directional: area of the disk, m²
+}
+
+// A light, or a sixth of one, as a camera with a square picture: a cell of the reflective shadow map.
+struct LightView {
+    view: View, // its rays are parallel for a directional light
+    light: u32, // index in `scene_lights`
+    kind: u32, // of the light
+    face: u32, // of a point light, whose six views follow each other: towards +x, −x, +y, −y, +z, −z; 0 for other lights
+    weight: f32, // what a texel of it can reflect, over the same of the view where that is most
 }
 
 // Counters and sizes of the frame.

@@ -28,6 +28,19 @@ fn warp_quad(p: vec2f, weights: vec4f) -> Warped {
     return out;
 }
 
+// The 2×2 texels of a level under a texel of the level above: (0, 0), (1, 0), (0, 1), (1, 1). Zero beyond the border, where a side is one texel.
+fn quad_weights(pyramid: texture_2d<f32>, above: vec2u, level: u32) -> vec4f {
+    let size = textureDimensions(pyramid, level);
+    var weights: vec4f;
+    for (var i = 0u; i < 4u; i++) {
+        let texel = 2u * above + vec2u(i & 1u, i >> 1u);
+        if all(texel < size) {
+            weights[i] = textureLoad(pyramid, texel, level).x;
+        }
+    }
+    return weights;
+}
+
 struct WarpedTexel {
     position: vec2f, // in texels of level 0
     texel: vec2u, // that which holds it
@@ -43,22 +56,15 @@ fn warp_to_texel(pyramid: texture_2d<f32>, seed: vec2f, levels: u32) -> WarpedTe
     var p = seed;
     var probability = 1.0;
     for (var level = last; level > stop; level--) {
-        let finer = level - 1u;
-        let q = 2u * quadrant;
-        let weights = vec4f(
-            textureLoad(pyramid, q, finer).x,
-            textureLoad(pyramid, q + vec2u(1u, 0u), finer).x,
-            textureLoad(pyramid, q + vec2u(0u, 1u), finer).x,
-            textureLoad(pyramid, q + vec2u(1u, 1u), finer).x,
-        );
-        let warped = warp_quad(p, weights);
-        quadrant = q + warped.quadrant;
+        let warped = warp_quad(p, quad_weights(pyramid, quadrant, level - 1u));
+        quadrant = 2u * quadrant + warped.quadrant;
         p = warped.position;
         probability *= warped.share;
     }
-    let cell = 1u << stop;
-    let side = f32(cell);
+    // A pyramid may be wider than high, or the other way round.
+    let cell = min(vec2u(1u << stop), textureDimensions(pyramid, 0));
+    let side = vec2f(cell);
     // The sum may round up to the next texel, the parts cannot.
-    let texel = quadrant * cell + min(vec2u(p * side), vec2u(cell - 1u));
-    return WarpedTexel((vec2f(quadrant) + p) * side, texel, probability / (side * side));
+    let texel = quadrant * cell + min(vec2u(p * side), cell - 1u);
+    return WarpedTexel((vec2f(quadrant) + p) * side, texel, probability / (side.x * side.y));
 }

@@ -1,11 +1,13 @@
 // Importance map. [ACRSM] 4.5 and 5.1.1.
 // Differs from the paper: the light's colour and the exponent are divided by their largest values, so that the result stays in [0, 1];
 // the sampled positions also cut off what lies behind the lit surface (it cannot receive its light).
+// Several lights: each is compared with its own brightest colour, then all of it weighted by what a texel of the light's view can reflect.
 
 #import common::scene::{Light, View, Frame}
+#import common::rsm::{scene_light_views, view_of_texel, texel_ray}
 #import common::view::pixel_direction
 #import common::octahedral::unpack_unit
-#import common::radiometry::{spot_falloff, max_component}
+#import common::radiometry::{falloff, max_component}
 #import common::random::{halton_23, hash}
 
 struct Params {
@@ -15,19 +17,18 @@ struct Params {
     shininess_scale: f32,
 }
 
-@group(0) @binding(0) var<uniform> scene_light: Light;
-@group(0) @binding(1) var<uniform> scene_light_view: View;
-@group(0) @binding(2) var<uniform> scene_camera: View;
-@group(0) @binding(3) var<uniform> frame: Frame;
-@group(0) @binding(4) var<uniform> params: Params;
-@group(0) @binding(5) var rsm_flux: texture_2d<f32>;
-@group(0) @binding(6) var rsm_albedo: texture_2d<f32>;
-@group(0) @binding(7) var rsm_specular: texture_2d<f32>;
-@group(0) @binding(8) var rsm_normal: texture_2d<u32>;
-@group(0) @binding(9) var rsm_distance: texture_2d<f32>;
-@group(0) @binding(10) var gbuffer_normal: texture_2d<u32>;
-@group(0) @binding(11) var gbuffer_distance: texture_2d<f32>;
-@group(0) @binding(12) var importance_map: texture_storage_2d<r32float, write>;
+@group(0) @binding(0) var<storage, read> scene_lights: array<Light>;
+@group(0) @binding(1) var<uniform> scene_camera: View;
+@group(0) @binding(2) var<uniform> frame: Frame;
+@group(0) @binding(3) var<uniform> params: Params;
+@group(0) @binding(4) var rsm_flux: texture_2d<f32>;
+@group(0) @binding(5) var rsm_albedo: texture_2d<f32>;
+@group(0) @binding(6) var rsm_specular: texture_2d<f32>;
+@group(0) @binding(7) var rsm_normal: texture_2d<u32>;
+@group(0) @binding(8) var rsm_distance: texture_2d<f32>;
+@group(0) @binding(9) var gbuffer_normal: texture_2d<u32>;
+@group(0) @binding(10) var gbuffer_distance: texture_2d<f32>;
+@group(0) @binding(11) var importance_map: texture_storage_2d<r32float, write>;
 
 const MAX_SAMPLES: u32 = 256u;
 const LANES: u32 = 64u;
@@ -74,17 +75,21 @@ fn estimate(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     let rsm_size = textureDimensions(rsm_flux);
     var importance = 0.0;
     if all(id.xy < rsm_size) && max_component(textureLoad(rsm_flux, id.xy, 0).rgb) > 0.0 {
-        let direction = pixel_direction(scene_light_view, id.xy, rsm_size);
-        let light = scene_light.strength / max(max_component(scene_light.strength), 1e-30) * saturate(spot_falloff(scene_light, direction));
+        let view = scene_light_views[view_of_texel(id.xy, rsm_size)];
+        let source = scene_lights[view.light];
+        let ray = texel_ray(id.xy, rsm_size);
+        let light = source.strength / max(max_component(source.strength), 1e-30) * saturate(falloff(source, ray.direction));
         let specular = textureLoad(rsm_specular, id.xy, 0);
         let f_d = max_component(textureLoad(rsm_albedo, id.xy, 0).rgb * light); // [ACRSM] eq. 5.1
         let f_s = max_component(specular.rgb * light) * saturate(specular.a / params.shininess_scale); // [ACRSM] eq. 5.2
         let brdf = f_d * params.diffuse_weight + f_s * (1.0 - params.diffuse_weight); // [ACRSM] eq. 4.1
         importance = (1.0 - params.view_weight) * brdf;
         if params.view_weight > 0.0 {
-            let lit = scene_light_view.origin + direction * textureLoad(rsm_distance, id.xy, 0).x;
+            let lit = ray.origin + ray.direction * textureLoad(rsm_distance, id.xy, 0).x;
             importance += params.view_weight * view_importance(lit, unpack_unit(textureLoad(rsm_normal, id.xy, 0).x)); // [ACRSM] eq. 4.3
         }
+        // Lights share the virtual lights by what their texels can reflect.
+        importance *= view.weight;
         // A lit texel is never worth nothing: warping must be able to reach it.
         importance = max(importance, 1e-6);
     }

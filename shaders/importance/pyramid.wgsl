@@ -1,4 +1,7 @@
-// Image pyramid of the importance map. [ACRSM] 4.5. The map's size is a power of two, so every level halves exactly.
+// Image pyramid of the importance map. [ACRSM] 4.5. The map's sides are powers of two, so every level halves exactly,
+// until the shorter side is one texel: from there on the mean is over two.
+
+#import common::warp::quad_weights
 
 @group(0) @binding(0) var importance_map: texture_2d<f32>;
 @group(0) @binding(1) var importance: texture_storage_2d<r32float, write>;
@@ -16,8 +19,8 @@ fn reduce(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= textureDimensions(importance)) {
         return;
     }
-    let p = 2u * id.xy;
-    let sum = textureLoad(importance_finer, p, 0).x + textureLoad(importance_finer, p + vec2u(1u, 0u), 0).x
-        + textureLoad(importance_finer, p + vec2u(0u, 1u), 0).x + textureLoad(importance_finer, p + vec2u(1u, 1u), 0).x;
-    textureStore(importance, id.xy, vec4f(0.25 * sum, 0.0, 0.0, 0.0));
+    let weights = quad_weights(importance_finer, id.xy, 0u);
+    let size = textureDimensions(importance_finer);
+    let share = select(0.25, 0.5, any(size == vec2u(1u)));
+    textureStore(importance, id.xy, vec4f(share * (weights.x + weights.y + weights.z + weights.w), 0.0, 0.0, 0.0));
 }

@@ -116,7 +116,7 @@ fn exact_mapping_is_the_nearest_cluster() {
     let (w_x, w_n, w_rho) = (parameter("weight_position"), parameter("weight_normal"), parameter("weight_importance"));
     let state = renderer.scene().sample(0.0);
     let diagonal = state.bounds.diagonal();
-    let view = state.light_view();
+    let view = state.light_views[0].view;
     let (map, normals, distances, importance) =
         (read(&renderer, "cluster_map"), read(&renderer, "rsm_normal"), read(&renderer, "rsm_distance"), read(&renderer, "importance_map"));
     let clusters: Vec<(usize, Cluster)> =

@@ -5,6 +5,7 @@ mod blocks;
 mod cli;
 mod clustering;
 mod determinism;
+mod light_kinds;
 mod lights;
 mod metrics;
 mod moving_light;

@@ -11,7 +11,7 @@ use manylight_graph::{
 };
 use manylight_scene::{
     Scene, SceneState,
-    gpu_data::{self, Frame, Light, SceneInfo, View},
+    gpu_data::{self, Frame, Light, LightView, SceneInfo, View},
 };
 
 /// The scene's texture array.
@@ -28,10 +28,13 @@ struct Entry {
 const ENTRIES: &[Entry] = &[
     uniform("frame", "Frame", "number of the frame, seed, scene time"),
     uniform("scene_camera", "View", "the camera"),
-    uniform("scene_light", "Light", "the first spot light, world space, W/sr; dark if the scene has none"),
-    uniform("scene_light_view", "View", "the cone of the first spot light as a square camera: full field of view = 2 × cut-off"),
     uniform("scene_info", "SceneInfo", "bounds, areas and counts of the scene at this time"),
     buffer("scene_lights", "Light", "all lights of all kinds at this time, world space; one dark light if there are none"),
+    buffer(
+        "scene_light_views",
+        "LightView",
+        "what the lights see, in their order: one view of a spot or directional light, six of a point light; a dark one if there are none",
+    ),
     buffer("scene_vertices", "Vertex", "vertices of all meshes, object space"),
     buffer("scene_triangles", "Triangle", "triangles of all objects"),
     buffer("scene_objects", "Object", "transforms of all objects at this time"),
@@ -71,6 +74,7 @@ pub fn declarations() -> Vec<External> {
 pub fn descriptions(scene: &Scene) -> BTreeMap<String, ResourceDesc> {
     let count = |name: &str| match name {
         "scene_lights" => scene.lights.len(),
+        "scene_light_views" => scene.light_view_count(),
         "scene_vertices" => scene.meshes.iter().map(|m| m.vertices.len()).sum(),
         "scene_triangles" => scene.triangle_count(),
         "scene_objects" => scene.objects.len(),
@@ -106,6 +110,7 @@ fn size_of_element(element: &str) -> u32 {
         "Frame" => size_of::<Frame>(),
         "View" => size_of::<View>(),
         "Light" => size_of::<Light>(),
+        "LightView" => size_of::<LightView>(),
         "SceneInfo" => size_of::<SceneInfo>(),
         "Vertex" => size_of::<gpu_data::Vertex>(),
         "Triangle" => size_of::<gpu_data::Triangle>(),
@@ -147,14 +152,13 @@ impl SceneUpload {
             upload_static(gpu, externals, scene)?;
             self.scene = Some(scene.hash);
         }
-        let (camera, light, light_view) = (state.camera_view(aspect), state.light(), state.light_view());
-        let parts: [(&'static str, &[u8]); 7] = [
+        let camera = state.camera_view(aspect);
+        let parts: [(&'static str, &[u8]); 6] = [
             ("frame", bytes_of(frame)),
             ("scene_camera", bytes_of(&camera)),
-            ("scene_light", bytes_of(&light)),
-            ("scene_light_view", bytes_of(&light_view)),
             ("scene_info", bytes_of(&state.info)),
             ("scene_lights", cast_slice(&state.lights)),
+            ("scene_light_views", cast_slice(&state.light_views)),
             ("scene_objects", cast_slice(&state.objects)),
         ];
         for (name, bytes) in parts {

@@ -27,13 +27,11 @@ mod bvh;
 pub mod documents;
 pub mod externals;
 pub mod host;
-mod lights;
 mod points_static;
 pub mod renderer;
 pub mod scene_source;
 
 pub use documents::{Documents, load_registry};
 pub use host::HostScene;
-pub use lights::lights_left_out;
 pub use renderer::{ReloadReport, RenderError, Renderer, Settings, plan_input};
 pub use scene_source::SceneSource;

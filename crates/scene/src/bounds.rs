@@ -52,6 +52,11 @@ impl Bounds {
         (self.min - point).max(point - self.max).max(DVec3::ZERO).length()
     }
 
+    /// A distance from a point beyond everything inside: twice the diagonal and the distance to the box.
+    pub fn beyond(&self, point: DVec3) -> f64 {
+        2.0 * (self.diagonal() + self.distance(point))
+    }
+
     /// The eight corners.
     pub fn corners(&self) -> [DVec3; 8] {
         std::array::from_fn(|i| DVec3::select(glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), self.max, self.min))

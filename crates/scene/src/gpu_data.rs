@@ -8,23 +8,23 @@ use manylight_graph::shader::{Layout, Member, MemberKind, Scalar};
 
 use crate::bvh::{BvhNode, BvhTriangle};
 
-/// A pinhole camera, or a light seen as one. World space, right-handed; all vectors have unit length.
+/// A pinhole camera, or a light seen as a camera, whose rays may be parallel. World space, right-handed; all vectors have unit length.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct View {
-    /// Reverse z without a far plane: 1 at `near`, 0 at infinity; y up.
+    /// Reverse z without a far plane: 1 at `near`, 0 at infinity; y up. Of parallel rays: 1 where they start, 0 at `far`.
     pub clip_from_world: Mat4,
-    /// The eye.
+    /// The eye. Of parallel rays: the middle of the square where they start.
     pub origin: Vec3,
-    /// Distance of the near plane.
+    /// Distance of the near plane; 0 for parallel rays.
     pub near: f32,
     /// To the right of the picture.
     pub right: Vec3,
-    /// Tangent of half the horizontal field of view.
+    /// Tangent of half the horizontal field of view. Of parallel rays: half the width of the picture, in the units of the world.
     pub tan_half_x: f32,
     /// To the top of the picture.
     pub up: Vec3,
-    /// Tangent of half the vertical field of view.
+    /// Tangent of half the vertical field of view. Of parallel rays: half the height of the picture.
     pub tan_half_y: f32,
     /// Into the picture.
     pub forward: Vec3,
@@ -81,6 +81,22 @@ pub struct Light {
     pub share: f32,
     /// `share` over what its rays are spread over: the solid angle of the cone or sphere in sr, or the area of the disk in m².
     pub ray_density: f32,
+}
+
+/// A light, or a sixth of one, as a camera with a square picture: a cell of the reflective shadow map.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct LightView {
+    /// The camera; its rays are parallel for a directional light.
+    pub view: View,
+    /// Index of the [`Light`].
+    pub light: u32,
+    /// The light's [`LightKind`].
+    pub kind: u32,
+    /// Of a point light, whose six views follow each other: towards +x, −x, +y, −y, +z, −z; 0 for other lights.
+    pub face: u32,
+    /// What a texel of it can reflect, over the same of the view where that is most.
+    pub weight: f32,
 }
 
 /// Counters and sizes of the frame.
@@ -207,36 +223,46 @@ impl View {
     ///
     /// Computed in 64 bits and rounded once.
     pub fn perspective(origin: Vec3, target: Vec3, up: Vec3, fov_x_rad: f32, aspect: f32, near: f32, far: f32) -> Self {
-        let (right, up, forward) = basis(origin.as_dvec3(), target.as_dvec3(), up.as_dvec3());
+        let forward = (target.as_dvec3() - origin.as_dvec3()).try_normalize().unwrap_or(DVec3::NEG_Z);
         let tan_half_x = (f64::from(fov_x_rad) / 2.0).tan();
-        let tan_half_y = tan_half_x / f64::from(aspect);
+        Self::along(origin, forward, up, [tan_half_x, tan_half_x / f64::from(aspect)], near, far)
+    }
+
+    /// The same along a unit vector, with the tangents of half the angles.
+    pub(crate) fn along(origin: Vec3, forward: DVec3, up: Vec3, tan_half: [f64; 2], near: f32, far: f32) -> Self {
+        let axes @ [right, up, forward] = basis(forward, up.as_dvec3());
         let eye = origin.as_dvec3();
         let row = |axis: DVec3| axis.extend(-axis.dot(eye)).as_vec4();
-        let rows = [row(right / tan_half_x), row(up / tan_half_y), Vec4::new(0.0, 0.0, 0.0, near), row(forward)];
-        Self {
-            clip_from_world: Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose(),
-            origin,
-            near,
-            right: right.as_vec3(),
-            tan_half_x: tan_half_x as f32,
-            up: up.as_vec3(),
-            tan_half_y: tan_half_y as f32,
-            forward: forward.as_vec3(),
-            far,
-        }
+        let rows = [row(right / tan_half[0]), row(up / tan_half[1]), Vec4::new(0.0, 0.0, 0.0, near), row(forward)];
+        Self::of_rows(rows, origin, axes, tan_half, [near, far])
+    }
+
+    /// Parallel rays along a unit vector, from a square of this half width around `origin`, of this length.
+    pub(crate) fn parallel(origin: Vec3, forward: DVec3, half_width: f64, length: f64) -> Self {
+        let axes @ [right, up, forward] = basis(forward, DVec3::Y);
+        let eye = origin.as_dvec3();
+        let row = |axis: DVec3, offset: f64| axis.extend(offset - axis.dot(eye)).as_vec4();
+        let rows = [row(right / half_width, 0.0), row(up / half_width, 0.0), row(-forward / length, 1.0), Vec4::W];
+        Self::of_rows(rows, origin, axes, [half_width; 2], [0.0, length as f32])
+    }
+
+    fn of_rows(rows: [Vec4; 4], origin: Vec3, axes: [DVec3; 3], half: [f64; 2], [near, far]: [f32; 2]) -> Self {
+        let [right, up, forward] = axes.map(|axis| axis.as_vec3());
+        let [tan_half_x, tan_half_y] = half.map(|half| half as f32);
+        let clip_from_world = Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose();
+        Self { clip_from_world, origin, near, right, tan_half_x, up, tan_half_y, forward, far }
     }
 }
 
-/// Right, up and forward of an eye. Defined for every input: see [`View::perspective`].
-fn basis(origin: DVec3, target: DVec3, up: DVec3) -> (DVec3, DVec3, DVec3) {
-    let forward = (target - origin).try_normalize().unwrap_or(DVec3::NEG_Z);
+/// Right, up and forward of an eye. Defined for every `up`: see [`View::perspective`].
+fn basis(forward: DVec3, up: DVec3) -> [DVec3; 3] {
     let right = [up, DVec3::Y, DVec3::Z, DVec3::X]
         .into_iter()
         .filter_map(DVec3::try_normalize)
         .map(|up| forward.cross(up))
         .find(|right| right.length_squared() > SMALLEST_SINE * SMALLEST_SINE)
         .map_or(DVec3::X, DVec3::normalize);
-    (right, right.cross(forward), forward)
+    [right, right.cross(forward), forward]
 }
 
 /// Sine of the angle to `up` below which a view counts as looking along it: the picture's roll would be rounding noise.
@@ -245,7 +271,7 @@ const SMALLEST_SINE: f64 = 1e-6;
 /// A Rust type with a WGSL counterpart.
 trait WgslType {
     /// Its WGSL type.
-    const KIND: MemberKind;
+    fn kind() -> MemberKind;
 }
 
 /// A scalar, vector or matrix.
@@ -254,24 +280,38 @@ const fn numeric(scalar: Scalar, rows: u32, columns: u32, column_stride: u32) ->
 }
 
 impl WgslType for f32 {
-    const KIND: MemberKind = numeric(Scalar::F32, 1, 1, 0);
+    fn kind() -> MemberKind {
+        numeric(Scalar::F32, 1, 1, 0)
+    }
 }
 
 impl WgslType for u32 {
-    const KIND: MemberKind = numeric(Scalar::U32, 1, 1, 0);
+    fn kind() -> MemberKind {
+        numeric(Scalar::U32, 1, 1, 0)
+    }
 }
 
 impl WgslType for Vec3 {
-    const KIND: MemberKind = numeric(Scalar::F32, 3, 1, 0);
+    fn kind() -> MemberKind {
+        numeric(Scalar::F32, 3, 1, 0)
+    }
 }
 
 impl WgslType for Mat4 {
-    const KIND: MemberKind = numeric(Scalar::F32, 4, 4, 16);
+    fn kind() -> MemberKind {
+        numeric(Scalar::F32, 4, 4, 16)
+    }
+}
+
+impl WgslType for View {
+    fn kind() -> MemberKind {
+        MemberKind::Struct("View".to_owned())
+    }
 }
 
 /// The WGSL type of a member's value.
 fn kind_of<T: WgslType>(_: &T) -> MemberKind {
-    T::KIND
+    T::kind()
 }
 
 /// The name and layout of a structure. A member that is left out does not compile.
@@ -294,6 +334,7 @@ pub fn layouts() -> Vec<(&'static str, Layout)> {
         layout!(BvhTriangle { a, index, ab, material, ac, object }),
         layout!(View { clip_from_world, origin, near, right, tan_half_x, up, tan_half_y, forward, far }),
         layout!(Light { position, kind, direction, falloff, strength, beam_rad, cutoff_rad, radius, share, ray_density }),
+        layout!(LightView { view, light, kind, face, weight }),
         layout!(Frame { index, seed, time, delta_time }),
         layout!(SceneInfo {
             bounds_min,

@@ -10,7 +10,7 @@
 //!
 //! let state = scene.sample(2.5);
 //! let view = state.camera_view(16.0 / 9.0);
-//! assert!(view.forward.is_normalized() && state.light().strength.x > 0.0);
+//! assert!(view.forward.is_normalized() && state.light_views.len() == 1);
 //! # Ok::<(), manylight_graph::diagnostics::Diagnostics>(())
 //! ```
 //!

@@ -14,6 +14,7 @@ use crate::{
     files::{Disk, FileReader},
     gpu_data::{self, Falloff},
     import::{Material, Mesh, Textures},
+    lights,
     motion::{CameraPose, LightPose, Pose, Repeat, Track},
 };
 
@@ -147,6 +148,11 @@ impl Scene {
     /// Number of triangles of all objects.
     pub fn triangle_count(&self) -> usize {
         self.objects.iter().map(|object| self.meshes[object.mesh].triangles.len()).sum()
+    }
+
+    /// Number of views of all lights, at least one: [`SceneState::light_views`](crate::SceneState::light_views).
+    pub fn light_view_count(&self) -> usize {
+        self.lights.iter().map(|light| lights::view_count(&light.shape)).sum::<usize>().max(1)
     }
 
     /// The vertices of all meshes, one mesh after the other.

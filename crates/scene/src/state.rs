@@ -4,10 +4,10 @@ use glam::{DMat3, DMat4, DVec3, Mat4};
 
 use crate::{
     bounds::Bounds,
-    gpu_data::{Light, LightKind, Object, SceneInfo, View},
+    gpu_data::{Light, LightView, Object, SceneInfo, View},
     import::Mesh,
-    lights,
-    motion::{CameraPose, LightPose, Pose},
+    lights::{self, NEAR},
+    motion::{CameraPose, Pose},
     scene::{Extent, Scene},
 };
 
@@ -20,17 +20,16 @@ pub struct SceneState {
     pub objects: Vec<Object>,
     /// The lights, with their shares of the power.
     pub lights: Vec<Light>,
+    /// What the lights see, in the order of the lights: one view of a spot or directional light, six of a point light. Without lights a dark one.
+    pub light_views: Vec<LightView>,
     /// The camera; [`SceneState::camera_view`] makes a view of it.
     pub camera: CameraPose,
     /// Around all objects, world space. Tight around objects that stand still, loose around others.
     pub bounds: Bounds,
     /// Extent and statistics.
     pub info: SceneInfo,
-    light_poses: Vec<LightPose>,
 }
 
-/// Distance of the near plane over the diagonal of the scene. With reverse z in 32-bit floats a near plane this close costs no precision.
-const NEAR: f64 = 1e-3;
 /// The near plane is never farther than this share of the distance from the camera to its target.
 const NEAR_OF_TARGET: f64 = 1e-2;
 /// … but never nearer than this share of the diagonal: a camera on its target still has a view.
@@ -68,15 +67,9 @@ impl Scene {
             light_count: self.lights.len() as u32,
             texture_count: self.textures.count,
         };
-        SceneState {
-            time,
-            objects,
-            lights: lights::on_gpu(&self.lights, &light_poses, &bounds),
-            camera: self.camera.at(time),
-            bounds,
-            info,
-            light_poses,
-        }
+        let lights = lights::on_gpu(&self.lights, &light_poses, &bounds);
+        let light_views = lights::views(&lights, &light_poses, &bounds);
+        SceneState { time, objects, lights, light_views, camera: self.camera.at(time), bounds, info }
     }
 }
 
@@ -90,31 +83,7 @@ impl SceneState {
         let diagonal = self.bounds.diagonal();
         let distance = origin.as_dvec3().distance(target.as_dvec3());
         let near = (NEAR * diagonal).min(NEAR_OF_TARGET * distance).max(NEAR_AT_LEAST * diagonal);
-        View::perspective(origin, target, up, fov_x_deg.to_radians(), aspect, near as f32, self.far(origin.as_dvec3()))
-    }
-
-    /// The first spot light, or a dark one if the scene has none.
-    pub fn light(&self) -> Light {
-        self.first_spot().map_or_else(|| lights::dark(&self.bounds), |index| self.lights[index])
-    }
-
-    /// The first spot light (or the dark one) as a square view whose full field of view is twice the cut-off.
-    pub fn light_view(&self) -> View {
-        let light = self.light();
-        let origin = light.position;
-        let target = self.first_spot().map(|index| self.light_poses[index].target).filter(|target| *target != origin);
-        let target = target.unwrap_or(origin + light.direction * self.info.diagonal);
-        let near = (NEAR * self.bounds.diagonal()) as f32;
-        View::perspective(origin, target, glam::Vec3::Y, 2.0 * light.cutoff_rad, 1.0, near, self.far(origin.as_dvec3()))
-    }
-
-    fn first_spot(&self) -> Option<usize> {
-        self.lights.iter().position(|light| light.kind == LightKind::Spot as u32)
-    }
-
-    /// A distance from a point beyond everything in the scene.
-    fn far(&self, origin: DVec3) -> f32 {
-        (2.0 * (self.bounds.diagonal() + self.bounds.distance(origin))) as f32
+        View::perspective(origin, target, up, fov_x_deg.to_radians(), aspect, near as f32, self.bounds.beyond(origin.as_dvec3()) as f32)
     }
 }
 

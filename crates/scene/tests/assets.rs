@@ -62,7 +62,7 @@ fn the_moving_box_sweeps_over_its_edge() {
     for i in 0..100 {
         let state = scene.sample(f64::from(i) * 0.1);
         assert!(state.bounds.min.min_element() > -1e-3 && state.bounds.max.max_element() < 5.6, "{:?}", state.bounds);
-        let light = state.light();
+        let light = state.lights[0];
         let to_back = (5.59 - light.position.z) / light.direction.z;
         let at = light.position + light.direction * to_back;
         if light.direction.z > 0.0 && at.x > 0.05 {
@@ -72,7 +72,7 @@ fn the_moving_box_sweeps_over_its_edge() {
         }
     }
     assert!(back > 30 && side > 30, "{back} {side}");
-    assert_eq!(scene.sample(0.0).light(), scene.sample(10.0).light());
+    assert_eq!(scene.sample(0.0).lights, scene.sample(10.0).lights);
 }
 
 /// The scenes of the reference images: `MANYLIGHT_SHARED`, or `shared` beside the repository.

@@ -11,6 +11,7 @@ fn wgsl_type(name: &str) -> (u32, u32) {
         "f32" | "u32" => (4, 4),
         "vec3f" => (16, 12),
         "mat4x4f" => (16, 64),
+        "View" => (16, size_of::<View>() as u32),
         other => panic!("unexpected type {other}"),
     }
 }
@@ -60,8 +61,12 @@ fn layouts_are_those_of_the_wgsl() {
             .members
             .iter()
             .map(|member| {
-                let MemberKind::Numeric { rows, columns, .. } = &member.kind else { panic!("{name}.{}", member.name) };
-                (member.name.clone(), member.offset, 4 * rows * columns)
+                let size = match &member.kind {
+                    MemberKind::Numeric { rows, columns, .. } => 4 * rows * columns,
+                    MemberKind::Struct(other) => wgsl_type(other).1,
+                    MemberKind::Array { .. } => panic!("{name}.{}", member.name),
+                };
+                (member.name.clone(), member.offset, size)
             })
             .collect();
         assert_eq!(ours, members, "{name}");

@@ -69,7 +69,9 @@ fn check(path: &str, obj: &[u8], mtl: &[u8], ron: &[u8]) -> Result<(), TestCaseE
     for time in [0.0, 0.7, 1e9] {
         let state = scene.sample(time);
         prop_assert!(state.info.diagonal.is_finite() && state.info.diagonal > 0.0 || state.bounds.diagonal() > 1e30);
-        prop_assert!(state.camera_view(1.5).forward.is_finite() && state.light_view().forward.is_finite());
+        prop_assert!(state.camera_view(1.5).forward.is_finite());
+        prop_assert_eq!(state.light_views.len(), scene.light_view_count());
+        prop_assert!(state.light_views.iter().all(|view| view.view.forward.is_finite() && view.weight.is_finite()));
         prop_assert!(
             state.lights.iter().all(|light| light.direction.is_finite() && light.share.is_finite() && light.ray_density.is_finite())
         );

@@ -63,12 +63,12 @@ fn the_light_moves_and_its_view_is_its_cone() {
         motion: [(time: 0.0), (time: 1.0, position: (1.0, 0.0, 0.0), target: (1.0, -1.0, 0.0), intensity: (4.0, 6.0, 8.0))])])")
     .unwrap();
     let state = scene.sample(0.5);
-    let light = state.light();
+    let light = state.lights[0];
     assert_eq!(light.position, Vec3::new(0.5, 0.0, 0.0));
     assert_eq!(light.strength, Vec3::new(3.0, 4.0, 5.0));
     assert_eq!(light.falloff, Falloff::Cosine as u32);
     assert!(light.direction.distance(Vec3::new(0.0, -0.5, 0.5).normalize()) < 1e-6);
-    let view = state.light_view();
+    let view = state.light_views[0].view;
     assert_eq!(view.forward, light.direction);
     assert!((view.tan_half_x - 30_f32.to_radians().tan()).abs() < 1e-6 && view.tan_half_x == view.tan_half_y);
     assert!((light.cutoff_rad - 30_f32.to_radians()).abs() < 1e-6);
@@ -87,8 +87,6 @@ fn lights_share_their_power() {
     let [sun, dark, spot, point] = state.lights[..] else { panic!("four lights") };
     let kinds = [LightKind::Directional, LightKind::Point, LightKind::Spot, LightKind::Point];
     assert_eq!(state.lights.iter().map(|light| light.kind).collect::<Vec<_>>(), kinds.map(|kind| kind as u32));
-    assert_eq!(state.light(), spot, "the first spot light, whatever comes before it");
-    assert_eq!(state.light_view().forward, spot.direction);
     assert_eq!((point.position, point.strength), (Vec3::new(1.0, 0.5, 0.0), Vec3::splat(2.0)));
     // W, summed over the colours: E·π·r² over the room's sphere, with room for rounding; I·Ω with Ω = π sr for the cone.
     let radius = 3_f32.sqrt();
@@ -113,8 +111,45 @@ fn dark_and_extreme_lights_have_finite_shares() {
         for mesh in ["\"room.obj\"", "Mesh(file: \"room.obj\", motion: [(time: 0, scale: 0)])"] {
             let state = ron(&format!("Scene(meshes: [{mesh}], lights: [{lights}])")).unwrap().sample(0.0);
             assert!(state.lights.iter().all(|light| light.share.is_finite() && light.ray_density.is_finite()), "{:?}", state.lights);
-            assert_eq!(state.light().strength.x > 0.0, lights.starts_with("Spot"), "a scene without spot lights has a dark one");
+            let views = &state.light_views;
+            assert_eq!(views.len(), scene_views(lights));
+            assert!(views.iter().all(|view| view.view.clip_from_world.is_finite() && (0.0..=1.0).contains(&view.weight)), "{views:?}");
         }
+    }
+}
+
+/// Views of lights as a scene file lists them.
+fn scene_views(lights: &str) -> usize {
+    lights.matches("Spot").count() + lights.matches("Directional").count() + 6 * lights.matches("Point").count()
+}
+
+/// A corner of the scene is in one view of each light that reaches everywhere, and each view knows its light.
+#[test]
+fn views_of_lights_cover_the_scene() {
+    let lights = "Directional(direction: (1, -2, 0.5), irradiance: 2), Point(position: (0.1, 0.2, -0.3), intensity: 3),
+        Spot(position: (0, 0, 0), target: (0, 0, 1), intensity: 5, beam_deg: 10, cutoff_deg: 45), Point(position: (0, 0, 9), intensity: 1)";
+    let scene = ron(&format!("Scene(meshes: [\"room.obj\"], lights: [{lights}])")).unwrap();
+    let state = scene.sample(0.0);
+    assert_eq!(state.light_views.len(), scene.light_view_count());
+    assert_eq!(scene.light_view_count(), scene_views(lights));
+    let of_light: Vec<_> = state.light_views.iter().map(|view| view.light).collect();
+    assert_eq!(of_light, [0, 1, 1, 1, 1, 1, 1, 2, 3, 3, 3, 3, 3, 3]);
+    assert!(state.light_views.iter().all(|view| view.kind == state.lights[view.light as usize].kind));
+    for corner in state.bounds.corners() {
+        let seen = |light: u32| {
+            let clips =
+                state.light_views.iter().filter(|v| v.light == light).map(|v| v.view.clip_from_world * corner.as_vec3().extend(1.0));
+            clips.filter(|c| c.x.abs() < c.w && c.y.abs() < c.w && c.z > 0.0 && c.z <= c.w).count()
+        };
+        assert_eq!((seen(0), seen(1), seen(3)), (1, 1, 1), "{corner}");
+    }
+    // E·A of the square around the scene, I·4π/6 of a face, and of a spot light whose square has the same solid angle.
+    let half = f64::from(state.lights[0].radius);
+    let face = 4.0 * std::f64::consts::PI / 6.0;
+    let powers = [(0, 2.0 * 4.0 * half * half), (1, 3.0 * face), (7, 5.0 * face), (8, face)];
+    for (index, power) in powers {
+        let weight = f64::from(state.light_views[index].weight);
+        assert!((weight - power / powers[0].1).abs() < 1e-5, "view {index}: {weight}");
     }
 }
 
@@ -130,7 +165,7 @@ fn near_and_far_hold_the_scene() {
         for corner in state.bounds.corners() {
             assert!(view.far > (corner.as_vec3() - view.origin).length());
         }
-        assert!(state.light_view().near < 2e-3 * diagonal);
+        assert!(state.light_views[0].view.near < 2e-3 * diagonal);
     }
 }
 
@@ -146,7 +181,7 @@ fn fitted_camera_and_light_see_and_light_the_scene() {
             assert!(clip.x.abs() <= clip.w && clip.y.abs() <= clip.w && clip.w > view.near, "{aspect}: {clip}");
         }
     }
-    let light = state.light();
+    let light = state.lights[0];
     let distance = light.position.distance(state.bounds.centre().as_vec3());
     assert!((light.strength.x / distance.powi(2) - std::f32::consts::PI).abs() < 1e-4);
     assert!(state.bounds.distance(light.position.as_dvec3()) == 0.0 && light.position.y > 0.5);
@@ -157,7 +192,7 @@ fn fitted_camera_and_light_see_and_light_the_scene() {
 fn a_flat_scene_is_lit_from_above() {
     let scene = obj("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n").unwrap();
     let state = scene.sample(0.0);
-    assert!(state.light().position.y > 0.1);
+    assert!(state.lights[0].position.y > 0.1);
     assert!(state.camera_view(1.0).clip_from_world.is_finite());
 }
 
@@ -166,7 +201,7 @@ fn no_lights_is_dark() {
     let scene = ron("Scene(meshes: [\"tri.obj\"], lights: [])").unwrap();
     crate::memory::assert_says(&scene.warnings, "", &["black"]);
     let state = scene.sample(0.0);
-    assert_eq!(state.light().strength, Vec3::ZERO);
-    assert!(state.light_view().clip_from_world.is_finite());
+    assert!(state.lights.is_empty());
+    assert!(state.light_views[0].view.clip_from_world.is_finite());
     assert_eq!(state.info.light_count, 0);
 }

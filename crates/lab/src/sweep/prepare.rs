@@ -10,7 +10,7 @@ use manylight_graph::{
     diagnostics::{Diagnostic, Diagnostics},
     library::Library,
 };
-use manylight_passes::{Documents, SceneSource, Settings, lights_left_out, load_registry, plan_input};
+use manylight_passes::{Documents, SceneSource, Settings, load_registry, plan_input};
 use manylight_scene::Scene;
 
 use super::{
@@ -35,7 +35,7 @@ pub struct Prepared {
     pub runs: Vec<Run>,
     /// Runs that their pipelines refuse.
     pub refused: Vec<Refused>,
-    /// What was mended in scenes, and lights that a variant leaves out.
+    /// What was mended in scenes.
     pub warnings: Diagnostics,
     /// By variant.
     pub(super) documents: Vec<Documents>,
@@ -86,8 +86,7 @@ pub fn prepare(sweep: Sweep, library: &Library, find: &SceneFinder<'_>) -> Resul
     let (runs, reference) = (sweep.runs(), open(Path::new(REFERENCE))?);
     let mut prepared =
         Prepared { sweep, runs, refused: Vec::new(), warnings: out, documents, scenes, reference, references: HashMap::new() };
-    let warnings = prepared.plan_all()?;
-    prepared.warnings.extend(warnings);
+    prepared.plan_all()?;
     prepared.read_references()?;
     Ok(prepared)
 }
@@ -110,10 +109,9 @@ impl Prepared {
         Task { documents: &self.reference, source, scene, size: run.size, what: &self.sweep.reference, time }
     }
 
-    /// Plans every run, and sets those apart that are refused; returns what is worth a warning.
-    fn plan_all(&mut self) -> Result<Diagnostics, SweepError> {
-        let (mut faults, mut warnings) = (Diagnostics::default(), Diagnostics::default());
-        let mut refusals = Diagnostics::default();
+    /// Plans every run, and sets those apart that are refused.
+    fn plan_all(&mut self) -> Result<(), SweepError> {
+        let (mut faults, mut refusals) = (Diagnostics::default(), Diagnostics::default());
         for run in std::mem::take(&mut self.runs) {
             let scene = &self.scenes[run.scene].scene;
             let (documents, input) = (&self.documents[run.variant], plan_input(&self.settings(&run), scene));
@@ -132,11 +130,6 @@ impl Prepared {
                             Diagnostic::error(format!("no node writes `{}` in the run `{}`", name.text, run.name), name.span.clone());
                         faults.push(fault.help("its conditions switch all nodes off that would: change the variant's settings"));
                     }
-                    if let Some(warning) = lights_left_out(scene, &plan)
-                        && !warnings.0.contains(&warning)
-                    {
-                        warnings.push(warning);
-                    }
                 }
                 Err(own) => {
                     faults.push(Diagnostic::error_nowhere(format!("the run `{}` cannot be planned", run.name)));
@@ -152,7 +145,7 @@ impl Prepared {
             faults.push(Diagnostic::error_nowhere(format!("every run of the sweep `{}` is refused", self.sweep.name)));
             faults.extend(refusals.0.into_iter().next().map(Diagnostics::from).unwrap_or_default());
         }
-        if faults.is_empty() { Ok(warnings) } else { Err(faults.into()) }
+        if faults.is_empty() { Ok(()) } else { Err(faults.into()) }
     }
 
     fn read_references(&mut self) -> Result<(), SweepError> {

@@ -10,9 +10,7 @@ use manylight::{
         pipeline::Pipeline,
         plan::{Debug, Plan, PlanInput},
     },
-    library,
-    passes::lights_left_out,
-    plan_input,
+    library, plan_input,
     renderer::{RenderError, Renderer},
     scene::Scene,
 };
@@ -67,11 +65,7 @@ impl Session {
 
     /// Binds everything to a device.
     pub fn renderer(self, gpu: &Gpu, scene: LoadedScene, settings: Settings) -> Result<Renderer, Fault> {
-        let renderer = Renderer::with(gpu, self.documents, scene.source, scene.scene, settings).map_err(of_render)?;
-        if let Some(warning) = lights_left_out(renderer.scene(), renderer.plan()) {
-            super::warn(&warning.into());
-        }
-        Ok(renderer)
+        Renderer::with(gpu, self.documents, scene.source, scene.scene, settings).map_err(of_render)
     }
 }
 

@@ -1,0 +1,152 @@
+// The reflective shadow map: a grid of square cells, one a view of a light, at most six in a row. From texels to rays and positions, and back, for
+// lights whose rays spread from a point (spot, point) and for those whose rays are parallel (directional). [RSM]; methods: radiometry.
+// A node whose entry points reach one of these functions has the port `scene_light_views`; `size` is always that of the whole map.
+
+#import common::scene::{Light, LightView, LIGHT_POINT, LIGHT_DIRECTIONAL}
+#import common::view::{pixel_direction, pixel_solid_angle, view_uv}
+#import common::radiometry::falloff
+
+@group(1) @binding(auto) var<storage, read> scene_light_views: array<LightView>;
+
+// Cells in a row: a point light has as many.
+const MOST_COLUMNS: u32 = 6u;
+
+fn view_count() -> u32 {
+    return arrayLength(&scene_light_views);
+}
+
+fn columns() -> u32 {
+    return min(MOST_COLUMNS, view_count());
+}
+
+fn rows() -> u32 {
+    return (view_count() + MOST_COLUMNS - 1u) / MOST_COLUMNS;
+}
+
+// Side of a cell in texels.
+fn cell_side(size: vec2u) -> u32 {
+    return size.x / columns();
+}
+
+// Column and row of a view's cell.
+fn cell_of_view(index: u32) -> vec2u {
+    return vec2u(index % MOST_COLUMNS, index / MOST_COLUMNS);
+}
+
+// View whose cell holds a texel. Cells at the end of the last row may be no view's: then it is not below `view_count()`.
+fn view_of_texel(texel: vec2u, size: vec2u) -> u32 {
+    let cell = texel / cell_side(size);
+    return cell.y * MOST_COLUMNS + cell.x;
+}
+
+// A rectangle of the map, in texels.
+struct Cell {
+    low: vec2f,
+    high: vec2f,
+}
+
+// The cell that holds a texel.
+fn cell_of_texel(texel: vec2u, size: vec2u) -> Cell {
+    let side = cell_side(size);
+    let low = vec2f(texel / side * side);
+    return Cell(low, low + f32(side));
+}
+
+fn in_cell(cell: Cell, place: vec2f) -> bool {
+    return all(place >= cell.low) && all(place < cell.high);
+}
+
+fn is_parallel(index: u32) -> bool {
+    return scene_light_views[index].kind == LIGHT_DIRECTIONAL;
+}
+
+struct TexelRay {
+    origin: vec3f, // the light, or where on the square before the scene the ray starts
+    direction: vec3f, // unit
+}
+
+// Ray through the centre of a texel.
+fn texel_ray(texel: vec2u, size: vec2u) -> TexelRay {
+    let index = view_of_texel(texel, size);
+    let side = cell_side(size);
+    let pixel = texel % side;
+    let view = scene_light_views[index].view;
+    if is_parallel(index) {
+        let ndc = vec2f(2.0, -2.0) * ((vec2f(pixel) + 0.5) / f32(side) - 0.5);
+        return TexelRay(view.origin + view.right * (ndc.x * view.tan_half_x) + view.up * (ndc.y * view.tan_half_y), view.forward);
+    }
+    return TexelRay(view.origin, pixel_direction(view, pixel, vec2u(side)));
+}
+
+// Where a texel's ray meets the surface that it saw, world space.
+fn texel_position(texel: vec2u, size: vec2u, distance: f32) -> vec3f {
+    let ray = texel_ray(texel, size);
+    return ray.origin + ray.direction * distance;
+}
+
+// What a texel's rays are spread over: solid angle, sr; of parallel rays the area across them, m².
+fn texel_extent(texel: vec2u, size: vec2u) -> f32 {
+    let index = view_of_texel(texel, size);
+    let side = cell_side(size);
+    let view = scene_light_views[index].view;
+    if is_parallel(index) {
+        let width = 2.0 * view.tan_half_x / f32(side);
+        return width * width;
+    }
+    return pixel_solid_angle(view, texel % side, vec2u(side));
+}
+
+// Power that a light sends through a texel, over its strength: sr; of parallel rays m².
+fn texel_power_of_unit_strength(light: Light, texel: vec2u, size: vec2u) -> f32 {
+    return falloff(light, texel_ray(texel, size).direction) * texel_extent(texel, size);
+}
+
+// A texel seen at a grazing angle stands for an area of its extent at that distance / cosθ: the cosine is kept from zero, which bounds the area at 50 times.
+const MIN_COSINE: f32 = 0.02;
+
+// Surface that a texel stands for, m²: `cosine` at the surface, towards the light.
+fn texel_area(texel: vec2u, size: vec2u, distance: f32, cosine: f32) -> f32 {
+    let spread = select(distance, 1.0, is_parallel(view_of_texel(texel, size)));
+    return texel_extent(texel, size) * spread * spread / max(cosine, MIN_COSINE);
+}
+
+// Where a view sees a world position: texels of the whole map in xy (outside of its cell: not seen), distance along its axis in z (≤ 0: behind it).
+fn position_in_map(index: u32, position: vec3f, size: vec2u) -> vec3f {
+    let view = scene_light_views[index].view;
+    var seen: vec3f;
+    if is_parallel(index) {
+        let v = position - view.origin;
+        seen = vec3f(0.5 + 0.5 * dot(v, view.right) / view.tan_half_x, 0.5 - 0.5 * dot(v, view.up) / view.tan_half_y, dot(v, view.forward));
+    } else {
+        seen = view_uv(view, position);
+    }
+    let side = cell_side(size);
+    return vec3f(seen.xy * f32(side) + vec2f(cell_of_view(index) * side), seen.z);
+}
+
+// Distance of a world position from its light as the map holds distances.
+fn distance_in_view(index: u32, position: vec3f) -> f32 {
+    let v = position - scene_light_views[index].view.origin;
+    return select(length(v), dot(v, scene_light_views[index].view.forward), is_parallel(index));
+}
+
+// Views of a view's light.
+fn views_of_light(index: u32) -> u32 {
+    return select(1u, MOST_COLUMNS, scene_light_views[index].kind == LIGHT_POINT);
+}
+
+// The view that sees a world position, of the light that has view `index`.
+fn view_towards(index: u32, position: vec3f) -> u32 {
+    if scene_light_views[index].kind != LIGHT_POINT {
+        return index;
+    }
+    let v = position - scene_light_views[index].view.origin;
+    let size = abs(v);
+    var axis = 2u;
+    if size.x >= size.y && size.x >= size.z {
+        axis = 0u;
+    } else if size.y >= size.z {
+        axis = 1u;
+    }
+    return index - scene_light_views[index].face + 2u * axis + select(0u, 1u, v[axis] < 0.0);
+}
