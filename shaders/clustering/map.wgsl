@@ -15,7 +15,7 @@ struct Params {
     window: u32,
     weight_position: f32,
     weight_normal: f32,
-    weight_importance: f32,
+    weight_attribute: f32,
 }
 
 @group(0) @binding(0) var<storage, read> clusters_warped: array<Cluster>;
@@ -29,6 +29,7 @@ struct Params {
 @group(0) @binding(8) var<storage, read_write> cluster_bounds: array<atomic<u32>>;
 
 override mapping_is_exact: bool;
+override attribute_is_flux: bool;
 override normal_distance_is_signed: bool;
 
 const GROUP: u32 = 16u;
@@ -51,6 +52,17 @@ fn clear(@builtin(global_invocation_id) id: vec3u) {
 fn in_window(texel: vec2f, centre: vec2f) -> bool {
     let offset = abs(texel - centre);
     return max(offset.x, offset.y) <= 0.5 * f32(params.window);
+}
+
+// Between a cluster and a texel, 0 to 1. A cluster's flux is that of its centre, as the paper updates it ([VAL] 4).
+fn difference(c: u32, flux: vec3f, rho: f32) -> f32 {
+    if !attribute_is_flux {
+        return abs(clusters_warped[c].importance - rho);
+    }
+    let size = textureDimensions(rsm_flux);
+    let own = textureLoad(rsm_flux, min(vec2u(clusters_warped[c].texel), size - 1u), 0).rgb;
+    // Over the sum of both: the weight means the same at any intensity.
+    return distance(own, flux) / max(length(own) + length(flux), 1e-30);
 }
 
 @compute @workgroup_size(16, 16)
@@ -76,7 +88,8 @@ fn assign(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group
     if any(id.xy >= size) {
         return;
     }
-    if max_component(textureLoad(rsm_flux, id.xy, 0).rgb) <= 0.0 {
+    let flux = textureLoad(rsm_flux, id.xy, 0).rgb;
+    if max_component(flux) <= 0.0 {
         textureStore(cluster_map, id.xy, vec4u(NO_CLUSTER));
         return;
     }
@@ -84,7 +97,7 @@ fn assign(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group
     let position = texel_position(id.xy, size, textureLoad(rsm_distance, id.xy, 0).x);
     let normal = unpack_unit(textureLoad(rsm_normal, id.xy, 0).x);
     let rho = textureLoad(importance, id.xy, 0).x;
-    let metric = Metric(params.weight_position, params.weight_normal, params.weight_importance, max(scene_info.diagonal, 1e-30), normal_distance_is_signed);
+    let metric = Metric(params.weight_position, params.weight_normal, params.weight_attribute, max(scene_info.diagonal, 1e-30), normal_distance_is_signed);
     let texel = vec2f(id.xy) + 0.5;
     let cell = cell_of_texel(id.xy, size);
     var best = NO_CLUSTER;
@@ -97,7 +110,7 @@ fn assign(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group
             if !in_cell(cell, clusters_warped[c].texel) || (!mapping_is_exact && !in_window(texel, clusters_warped[c].texel)) {
                 continue;
             }
-            let d = cluster_distance(metric, clusters_warped[c].position, clusters_warped[c].normal, clusters_warped[c].importance, position, normal, rho);
+            let d = cluster_distance(metric, clusters_warped[c].position, clusters_warped[c].normal, position, normal, difference(c, flux, rho));
             if d < best_distance {
                 best = c;
                 best_distance = d;
@@ -110,7 +123,7 @@ fn assign(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group
         var foreign_distance = 3.0e38;
         for (var c = 0u; c < count; c++) {
             if clusters_warped[c].state == CLUSTER_ACTIVE {
-                let d = cluster_distance(metric, clusters_warped[c].position, clusters_warped[c].normal, clusters_warped[c].importance, position, normal, rho);
+                let d = cluster_distance(metric, clusters_warped[c].position, clusters_warped[c].normal, position, normal, difference(c, flux, rho));
                 if in_cell(cell, clusters_warped[c].texel) {
                     if d < best_distance {
                         best = c;

@@ -113,7 +113,7 @@ fn exact_mapping_is_the_nearest_cluster() {
         let node = renderer.plan().nodes.iter().find(|n| n.id == "map").expect("a node `map`");
         node.params.iter().find(|(n, _)| n == name).expect("a weight").1.to_string().parse::<f64>().expect("a number")
     };
-    let (w_x, w_n, w_rho) = (parameter("weight_position"), parameter("weight_normal"), parameter("weight_importance"));
+    let (w_x, w_n, w_rho) = (parameter("weight_position"), parameter("weight_normal"), parameter("weight_attribute"));
     let state = renderer.scene().sample(0.0);
     let diagonal = state.bounds.diagonal();
     let view = state.light_views[0].view;
