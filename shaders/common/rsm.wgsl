@@ -65,17 +65,31 @@ struct TexelRay {
     direction: vec3f, // unit
 }
 
-// Ray through the centre of a texel.
-fn texel_ray(texel: vec2u, size: vec2u) -> TexelRay {
-    let index = view_of_texel(texel, size);
+// A texel as a pixel of a view. Whole numbers are divided to find it, which is dear: what reads many texels of a view finds it once.
+struct Place {
+    view: u32,
+    side: u32, // of the view's picture
+    pixel: vec2u,
+}
+
+fn place_of_texel(texel: vec2u, size: vec2u) -> Place {
     let side = cell_side(size);
-    let pixel = texel % side;
-    let view = scene_light_views[index].view;
-    if is_parallel(index) {
-        let ndc = vec2f(2.0, -2.0) * ((vec2f(pixel) + 0.5) / f32(side) - 0.5);
+    let cell = texel / side;
+    return Place(cell.y * MOST_COLUMNS + cell.x, side, texel - cell * side);
+}
+
+// Ray through the centre of a texel.
+fn ray_at(place: Place) -> TexelRay {
+    let view = scene_light_views[place.view].view;
+    if is_parallel(place.view) {
+        let ndc = vec2f(2.0, -2.0) * ((vec2f(place.pixel) + 0.5) / f32(place.side) - 0.5);
         return TexelRay(view.origin + view.right * (ndc.x * view.tan_half_x) + view.up * (ndc.y * view.tan_half_y), view.forward);
     }
-    return TexelRay(view.origin, pixel_direction(view, pixel, vec2u(side)));
+    return TexelRay(view.origin, pixel_direction(view, place.pixel, vec2u(place.side)));
+}
+
+fn texel_ray(texel: vec2u, size: vec2u) -> TexelRay {
+    return ray_at(place_of_texel(texel, size));
 }
 
 // Where a texel's ray meets the surface that it saw, world space.
@@ -85,20 +99,18 @@ fn texel_position(texel: vec2u, size: vec2u, distance: f32) -> vec3f {
 }
 
 // What a texel's rays are spread over: solid angle, sr; of parallel rays the area across them, m².
-fn texel_extent(texel: vec2u, size: vec2u) -> f32 {
-    let index = view_of_texel(texel, size);
-    let side = cell_side(size);
-    let view = scene_light_views[index].view;
-    if is_parallel(index) {
-        let width = 2.0 * view.tan_half_x / f32(side);
+fn extent_at(place: Place) -> f32 {
+    let view = scene_light_views[place.view].view;
+    if is_parallel(place.view) {
+        let width = 2.0 * view.tan_half_x / f32(place.side);
         return width * width;
     }
-    return pixel_solid_angle(view, texel % side, vec2u(side));
+    return pixel_solid_angle(view, place.pixel, vec2u(place.side));
 }
 
 // Power that a light sends through a texel, over its strength: sr; of parallel rays m².
-fn texel_power_of_unit_strength(light: Light, texel: vec2u, size: vec2u) -> f32 {
-    return falloff(light, texel_ray(texel, size).direction) * texel_extent(texel, size);
+fn power_of_unit_strength_at(light: Light, place: Place) -> f32 {
+    return falloff(light, ray_at(place).direction) * extent_at(place);
 }
 
 // A texel seen at a grazing angle stands for an area of its extent at that distance / cosθ: the cosine is kept from zero, which bounds the area at 50 times.
@@ -106,8 +118,9 @@ const MIN_COSINE: f32 = 0.02;
 
 // Surface that a texel stands for, m²: `cosine` at the surface, towards the light.
 fn texel_area(texel: vec2u, size: vec2u, distance: f32, cosine: f32) -> f32 {
-    let spread = select(distance, 1.0, is_parallel(view_of_texel(texel, size)));
-    return texel_extent(texel, size) * spread * spread / max(cosine, MIN_COSINE);
+    let place = place_of_texel(texel, size);
+    let spread = select(distance, 1.0, is_parallel(place.view));
+    return extent_at(place) * spread * spread / max(cosine, MIN_COSINE);
 }
 
 // Where a view sees a world position: texels of the whole map in xy (outside of its cell: not seen), distance along its axis in z (≤ 0: behind it).

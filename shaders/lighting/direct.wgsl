@@ -5,7 +5,7 @@
 #import common::scene::{View, Light}
 #import common::view::pixel_direction
 #import common::rsm::{
-    scene_light_views, view_count, views_of_light, view_towards, position_in_map, distance_in_view, texel_ray, cell_side, cell_of_view,
+    Place, scene_light_views, view_count, views_of_light, view_towards, position_in_map, distance_in_view, ray_at, cell_side, cell_of_view,
 }
 #import common::octahedral::unpack_unit
 #import common::radiometry::{light_at, luminance, max_component, lambert_blinn}
@@ -34,16 +34,16 @@ fn shadow(index: u32, position: vec3f, normal: vec3f) -> f32 {
         return 0.0;
     }
     let own = max(distance_in_view(index, position), 1e-30);
-    let first = vec2i(cell_of_view(index) * cell_side(size));
-    let last = first + vec2i(i32(cell_side(size)) - 1);
-    let middle = vec2i(floor(seen.xy));
+    let side = cell_side(size);
+    let first = cell_of_view(index) * side;
+    let middle = vec2i(floor(seen.xy)) - vec2i(first);
     let low = -i32(params.pcf - 1u) / 2;
     var lit = 0.0;
     for (var y = 0u; y < params.pcf; y++) {
         for (var x = 0u; x < params.pcf; x++) {
-            let texel = vec2u(clamp(middle + vec2i(low) + vec2i(i32(x), i32(y)), first, last));
-            let stored = textureLoad(rsm_distance, texel, 0).x;
-            let ray = texel_ray(texel, size);
+            let pixel = vec2u(clamp(middle + vec2i(low) + vec2i(i32(x), i32(y)), vec2i(0), vec2i(i32(side) - 1)));
+            let stored = textureLoad(rsm_distance, first + pixel, 0).x;
+            let ray = ray_at(Place(index, side, pixel));
             let reciprocal = plane_reciprocal(dot(normal, ray.direction), dot(normal, position - ray.origin), own);
             lit += select(0.0, 1.0, stored <= 0.0 || stored * reciprocal >= 1.0 - params.direct_bias);
         }

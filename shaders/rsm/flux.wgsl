@@ -2,7 +2,7 @@
 // The paper's Φ = k cosθ/cosω is this up to a constant; the physical one makes ΣΦ the power that the scene reflects once.
 
 #import common::scene::Light
-#import common::rsm::{scene_light_views, view_count, view_of_texel, texel_extent, texel_power_of_unit_strength}
+#import common::rsm::{scene_light_views, view_count, place_of_texel, extent_at, power_of_unit_strength_at}
 
 @group(0) @binding(0) var<storage, read> scene_lights: array<Light>;
 @group(0) @binding(1) var rsm_albedo: texture_2d<f32>;
@@ -14,12 +14,12 @@ fn reflect_flux(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= size) {
         return;
     }
-    let index = view_of_texel(id.xy, size);
+    let place = place_of_texel(id.xy, size);
     var flux = vec4f(0.0);
-    if index < view_count() {
-        let light = scene_lights[scene_light_views[index].light];
-        let rgb = textureLoad(rsm_albedo, id.xy, 0).rgb * light.strength * texel_power_of_unit_strength(light, id.xy, size);
-        flux = vec4f(rgb, texel_extent(id.xy, size));
+    if place.view < view_count() {
+        let light = scene_lights[scene_light_views[place.view].light];
+        let rgb = textureLoad(rsm_albedo, id.xy, 0).rgb * light.strength * power_of_unit_strength_at(light, place);
+        flux = vec4f(rgb, extent_at(place));
     }
     textureStore(rsm_flux, id.xy, flux);
 }
