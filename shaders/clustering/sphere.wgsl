@@ -1,12 +1,13 @@
-// Virtual lights from a Halton sequence on the unit sphere around the light. [SOI] 3.1, [HALTON].
-// Points are uniform in solid angle: a light stands for Ω / N, and its flux is ρ I(θ) Ω / N (methods: radiometry), read as Φ_j / ω_j of its texel.
-// One workgroup tests the sequence, 256 points at a time, until N are inside of the cone: their order, and so which are first, needs no counting
+// Virtual lights from a Halton sequence on the unit sphere around each light. [SOI] 3.1, [HALTON].
+// Points are uniform in solid angle: one of a light's n stands for Ω / n, and its flux is ρ I(θ) Ω / n (methods: radiometry), read as Φ_j / ω_j of its
+// texel. A point light has the whole sphere; of a directional light points are uniform over the disk that its rays pass. Lights share N by their power.
+// A workgroup a light tests the sequence, 256 points at a time, until n are inside of the cone: their order, and so which are first, needs no counting
 // across workgroups. It stops at LAST_POINT (1024 rounds of some 25: below the 65,535 rounds that software adapters allow).
-// Differs from the paper: a cone with fewer than N of these points gets all its directions by mapping the sequence into it, which is as uniform.
+// Differs from the paper: a cone with fewer than n of these points gets all its directions by mapping the sequence into it, which is as uniform.
 
-#import common::cluster::{Cluster, CLUSTER_ACTIVE, texel_area}
-#import common::scene::{Light, View}
-#import common::view::{pixel_direction, view_uv}
+#import common::cluster::{Cluster, CLUSTER_ACTIVE}
+#import common::scene::{Light, LIGHT_DIRECTIONAL}
+#import common::rsm::{scene_light_views, view_count, view_towards, position_in_map, cell_of_view, cell_side, texel_ray, texel_area}
 #import common::octahedral::unpack_unit
 #import common::radiometry::{PI, max_component}
 #import common::random::halton_23
@@ -16,13 +17,12 @@ struct Params {
     tiles: u32,
 }
 
-@group(0) @binding(0) var<uniform> scene_light: Light;
-@group(0) @binding(1) var<uniform> scene_light_view: View;
-@group(0) @binding(2) var rsm_flux: texture_2d<f32>;
-@group(0) @binding(3) var rsm_normal: texture_2d<u32>;
-@group(0) @binding(4) var rsm_distance: texture_2d<f32>;
-@group(0) @binding(5) var<uniform> params: Params;
-@group(0) @binding(6) var<storage, read_write> clusters: array<Cluster>;
+@group(0) @binding(0) var<storage, read> scene_lights: array<Light>;
+@group(0) @binding(1) var rsm_flux: texture_2d<f32>;
+@group(0) @binding(2) var rsm_normal: texture_2d<u32>;
+@group(0) @binding(3) var rsm_distance: texture_2d<f32>;
+@group(0) @binding(4) var<uniform> params: Params;
+@group(0) @binding(5) var<storage, read_write> clusters: array<Cluster>;
 
 override directions_is_sphere: bool;
 
@@ -32,15 +32,60 @@ const LAST_POINT: u32 = 262144u;
 // Share of the points up to the last that is taken to fall into a cone of that share of the sphere: the sequence is even to far less than the rest.
 const CERTAIN: f32 = 0.9;
 
-// Where the lights may be: directions around an axis.
+// Texels by which lights stay within their cell.
+const RIM: f32 = 1e-3;
+
+// A light, and the run of virtual lights that are its own.
+struct Source {
+    light: u32,
+    first: u32,
+    count: u32,
+}
+
+// Virtual lights of all lights before `light`.
+fn lights_before(light: u32) -> u32 {
+    let all = arrayLength(&clusters);
+    var share = 0.0;
+    for (var i = 0u; i < light; i++) {
+        share += scene_lights[i].share;
+    }
+    return select(min(u32(round(share * f32(all))), all), all, light == arrayLength(&scene_lights));
+}
+
+fn source_of_light(light: u32) -> Source {
+    let first = lights_before(light);
+    return Source(light, first, lights_before(light + 1u) - first);
+}
+
+// Which light virtual light `c` is of.
+fn source_of(c: u32) -> Source {
+    for (var light = 0u; light < arrayLength(&scene_lights); light++) {
+        let source = source_of_light(light);
+        if c < source.first + source.count {
+            return source;
+        }
+    }
+    return Source();
+}
+
+// First of a light's views.
+fn view_of_light(light: u32) -> u32 {
+    var index = 0u;
+    while index + 1u < view_count() && scene_light_views[index].light != light {
+        index++;
+    }
+    return index;
+}
+
+// Where rays of a light may go: directions around an axis.
 struct Cone {
     axis: vec3f,
     height: f32, // 1 − cosine of the half-angle: share of the sphere times 2
 }
 
-fn light_cone() -> Cone {
-    let s = sin(0.5 * scene_light.cutoff_rad);
-    return Cone(scene_light.direction, 2.0 * s * s);
+fn light_cone(light: Light) -> Cone {
+    let s = sin(0.5 * light.cutoff_rad); // point lights: half of π
+    return Cone(light.direction, 2.0 * s * s);
 }
 
 // Point of the cylinder around the sphere, of equal area: height in [−1, 1] and angle in [0, 1).
@@ -70,27 +115,34 @@ fn inside(cone: Cone, direction: vec3f) -> bool {
     return 0.5 * dot(offset, offset) <= cone.height;
 }
 
-// Whether the sphere's points are enough for `count` lights.
-fn rejects(cone: Cone, count: u32) -> bool {
-    return directions_is_sphere && f32(count) <= 0.5 * cone.height * CERTAIN * f32(LAST_POINT);
+// Whether `count` directions are the first of the sphere's points, and enough of these are tested.
+fn rejects(light: Light, count: u32) -> bool {
+    return directions_is_sphere && light.kind != LIGHT_DIRECTIONAL
+        && f32(count) <= 0.5 * light_cone(light).height * CERTAIN * f32(LAST_POINT);
 }
 
 var<workgroup> accepted: array<atomic<u32>, WORDS>; // a bit a lane
 var<workgroup> found: u32;
 
 @compute @workgroup_size(256)
-fn choose(@builtin(local_invocation_index) lane: u32) {
-    let count = arrayLength(&clusters);
-    let cone = light_cone();
-    if !rejects(cone, count) {
-        for (var i = lane; i < count; i += LANES) {
-            clusters[light_of_point(i, count, params.tiles)].generation = i + 1u; // point 0 is a pole
+fn choose(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let view = group.x;
+    // A group a light: its first view's.
+    if view >= view_count() || scene_light_views[view].face != 0u {
+        return;
+    }
+    let source = source_of_light(scene_light_views[view].light);
+    let light = scene_lights[source.light];
+    if !rejects(light, source.count) {
+        for (var i = lane; i < source.count; i += LANES) {
+            clusters[source.first + light_of_point(i, source.count, params.tiles)].generation = i + 1u; // point 0 is a pole
         }
         return;
     }
+    let cone = light_cone(light);
     for (var first = 1u; first < LAST_POINT; first += LANES) {
         let before = workgroupUniformLoad(&found);
-        if before >= count {
+        if before >= source.count {
             break;
         }
         if lane < WORDS {
@@ -112,8 +164,8 @@ fn choose(@builtin(local_invocation_index) lane: u32) {
             let lower = select(0u, bits, word < lane / 32u) | select(0u, bits & ((1u << (lane % 32u)) - 1u), word == lane / 32u);
             rank += countOneBits(lower);
         }
-        if is_inside && rank < count {
-            clusters[light_of_point(rank, count, params.tiles)].generation = index;
+        if is_inside && rank < source.count {
+            clusters[source.first + light_of_point(rank, source.count, params.tiles)].generation = index;
         }
         if lane == 0u {
             found = before + total;
@@ -121,40 +173,61 @@ fn choose(@builtin(local_invocation_index) lane: u32) {
     }
 }
 
+// What a light's points are spread over, and a place that the ray of one of them passes.
+struct Ray {
+    extent: f32, // solid angle, sr; of directional lights area, m²
+    through: vec3f,
+}
+
+fn ray_of(light: Light, view: u32, index: u32, count: u32) -> Ray {
+    let camera = scene_light_views[view].view;
+    if light.kind == LIGHT_DIRECTIONAL {
+        // The disk around the scene, within the square that the view sees.
+        let point = halton_23(index);
+        let radius = camera.tan_half_x * sqrt(point.y);
+        let phi = 2.0 * PI * point.x;
+        return Ray(PI * camera.tan_half_x * camera.tan_half_x, camera.origin + radius * (sin(phi) * camera.right + cos(phi) * camera.up));
+    }
+    let cone = light_cone(light);
+    var direction: vec3f;
+    if rejects(light, count) {
+        direction = sphere_direction(index);
+    } else {
+        direction = cone_direction(cone, index);
+    }
+    return Ray(2.0 * PI * cone.height, camera.origin + direction);
+}
+
 @compute @workgroup_size(64)
 fn place(@builtin(global_invocation_id) id: vec3u) {
     let c = id.x;
-    let count = arrayLength(&clusters);
-    if c >= count {
+    if c >= arrayLength(&clusters) {
         return;
     }
-    let cone = light_cone();
+    let source = source_of(c);
+    let first_view = view_of_light(source.light);
     var light = Cluster();
     light.generation = clusters[c].generation;
-    var direction: vec3f;
-    if rejects(cone, count) {
-        direction = sphere_direction(light.generation);
-    } else {
-        direction = cone_direction(cone, light.generation);
-    }
+    let ray = ray_of(scene_lights[source.light], first_view, light.generation, source.count);
     let size = textureDimensions(rsm_flux);
-    let at = view_uv(scene_light_view, scene_light_view.origin + direction).xy * vec2f(size);
-    // At the rim of the cone the projection may round to the texel beyond the map.
-    let texel = min(vec2u(max(at, vec2f(0.0))), size - 1u);
-    light.texel = at;
+    let view = view_towards(first_view, ray.through);
+    let side = cell_side(size);
+    let cell = cell_of_view(view) * side;
+    // At the rim of a cell the projection may round to the texel beyond.
+    light.texel = clamp(position_in_map(view, ray.through, size).xy, vec2f(cell), vec2f(cell + side) - RIM);
+    let texel = min(vec2u(light.texel), cell + side - 1u);
     let flux = textureLoad(rsm_flux, texel, 0);
     if max_component(flux.rgb) > 0.0 {
-        let ray = pixel_direction(scene_light_view, texel, size);
+        let seen = texel_ray(texel, size);
         let d = textureLoad(rsm_distance, texel, 0).x;
-        // Solid angle that the light stands for, and how many texels that are.
-        let solid_angle = 2.0 * PI * cone.height / f32(count);
-        let texels = solid_angle / flux.a;
+        // How many texels the light stands for.
+        let texels = ray.extent / f32(source.count) / flux.a;
         light.state = CLUSTER_ACTIVE;
-        light.position = scene_light_view.origin + ray * d;
+        light.position = seen.origin + seen.direction * d;
         light.normal = unpack_unit(textureLoad(rsm_normal, texel, 0).x);
         light.importance = 1.0;
         light.flux = flux.rgb * texels;
-        light.area = texel_area(solid_angle, d, -dot(light.normal, ray));
+        light.area = texel_area(texel, size, d, -dot(light.normal, seen.direction)) * texels;
         light.count = max(u32(round(texels)), 1u);
     }
     clusters[c] = light;

@@ -5,11 +5,12 @@
 // The paper leaves open how much a negative light takes away and whether its direction is towards or from the lights; this is what conserves energy.
 // What bounds it: a negative light looks at all lights (at most 4096 rounds), and has one invocation.
 
-#import common::cluster::{Cluster, CLUSTER_ACTIVE, texel_area}
+#import common::cluster::{Cluster, CLUSTER_ACTIVE}
 #import common::dispatch::linear_index
 #import common::octahedral::unpack_unit
 #import common::radiometry::{disk_form_factor, luminance}
 #import common::random::halton_23
+#import common::rsm::MIN_COSINE
 #import common::scene::{View, SceneInfo}
 #import common::tiles::point_of_light
 #import common::view::{pixel_direction, pixel_solid_angle}
@@ -74,11 +75,12 @@ fn negative_light(i: u32, count: u32) -> Cluster {
     if luminance(behind.irradiance) <= 0.0 {
         return light;
     }
-    let pixels = f32(size.x * size.y) / f32(count);
+    // What the pixels of a sample cover, across the ray and on the surface.
+    let solid_angle = pixel_solid_angle(scene_camera, pixel, size) * f32(size.x * size.y) / f32(count);
     light.state = CLUSTER_ACTIVE;
     light.count = 1u;
     light.position = position;
-    light.area = texel_area(pixel_solid_angle(scene_camera, pixel, size) * pixels, distance, -dot(normal, ray));
+    light.area = solid_angle * distance * distance / max(-dot(normal, ray), MIN_COSINE);
     light.normal = normalize(behind.way); // no two ways are opposite: all come from behind
     light.flux = -params.negative_strength * light.area * behind.irradiance;
     return light;

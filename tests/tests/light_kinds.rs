@@ -96,7 +96,7 @@ const POINT: &str = "Point(position: (2.78, 4.0, 2.2), intensity: (8.0, 6.0, 4.0
 const SUN: &str = "Directional(direction: (0.3, -0.5, 1.0), irradiance: (3.0, 2.0, 1.0))";
 
 /// The Cornell box of the assets under other lights.
-fn cornell(folder: &tempfile::TempDir, lights: &[&str]) -> PathBuf {
+pub fn cornell(folder: &tempfile::TempDir, lights: &[&str]) -> PathBuf {
     let mesh = root().join("assets/cornell.obj");
     let camera = "(origin: (2.78, 2.73, -8.0), target: (2.78, 2.73, 0.0), fov_x_deg: 39.3077)";
     let path = folder.path().join(format!("{}.ron", lights.len()));
@@ -105,7 +105,7 @@ fn cornell(folder: &tempfile::TempDir, lights: &[&str]) -> PathBuf {
     path
 }
 
-fn cases() -> [(&'static str, Vec<&'static str>); 4] {
+pub fn cases() -> [(&'static str, Vec<&'static str>); 4] {
     [("spot", vec![SPOT]), ("point", vec![POINT]), ("directional", vec![SUN]), ("several", vec![SUN, SPOT, POINT])]
 }
 

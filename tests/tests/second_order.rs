@@ -3,7 +3,8 @@
 use std::{collections::BTreeSet, f64::consts::PI, fs, path::Path};
 
 use crate::{
-    clustering::sums,
+    clustering::{sums, texels},
+    light_kinds::{cases, cornell},
     reference::rgb,
     renders::{Cluster, Job, read, read_clusters},
     support::{manylight, root},
@@ -109,6 +110,47 @@ fn the_flux_of_even_lights_is_the_flux_of_the_map() {
     }
 }
 
+/// Also where lights share the number: each has its own part of the map.
+#[test]
+fn lights_of_every_kind_carry_the_flux_of_their_views() {
+    const COUNT: usize = 1024;
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (name, sources) in cases() {
+        let job = second_order(Job::scene(&cornell(&folder, &sources)).small()).set("clusters", COUNT);
+        let renderer = job.keep(&["clusters", "rsm_flux"]).render();
+        let map = read(&renderer, "rsm_flux");
+        // Cells are square and in one row, six of them for a point light.
+        let views: Vec<usize> = sources.iter().map(|source| if source.starts_with("Point") { 6 } else { 1 }).collect();
+        let columns = views.iter().sum::<usize>().min(6) as u32;
+        let side = map.width / columns;
+        let view_of = |x: u32, y: u32| ((y / side) * 6 + x / side) as usize;
+        let source_of = |view: usize| {
+            views
+                .iter()
+                .scan(0, |last, n| {
+                    *last += n;
+                    Some(*last)
+                })
+                .position(|last| view < last)
+        };
+        let mut flux = vec![[0.0; 2]; sources.len()];
+        for (x, y, texel) in texels(&map) {
+            if let Some(source) = source_of(view_of(x, y)) {
+                flux[source][0] += texel[1];
+            }
+        }
+        let lights = read_clusters(&renderer, "clusters");
+        for light in lights.iter().filter(|light| light.state == 1) {
+            let at = light.texel.map(|t| (t as u32).min(map.width - 1));
+            flux[source_of(view_of(at[0], at[1])).expect("a light in a view")][1] += light.flux[1];
+        }
+        for (source, [expected, sum]) in sources.iter().zip(&flux) {
+            println!("{name}, {source}: {:.4}", sum / expected);
+            assert!(*expected > 0.0 && (sum / expected - 1.0).abs() < 0.05, "{name}, {source}: {sum} W of {expected} W");
+        }
+    }
+}
+
 /// A wall that the light hits, and a larger one that the camera sees from behind, square on: all of the picture is that wall.
 const WALLS: &str = "\
 v -2 -1 -1\nv -2 1 -1\nv -2 1 1\nv -2 -1 1\nf 1 2 3 4
@@ -203,11 +245,7 @@ fn negative_lights_are_no_addition_to_shadows() {
     let run = |set: &str| {
         manylight(&["render", "second_order", "--scene", "cornell", "--size", "8x8", "--frames", "1", "--set", set, "--out", &out])
     };
-    run("visibility=pcss").expect(1).says(&[
-        "`virtual_lights`",
-        "`negative_lights` is 150, not below 1",
-        "`visibility` is not `none` but `pcss`",
-    ]);
+    run("visibility=pcss").expect(1).says(&["these values are refused", "negative lights", "`visibility` is `pcss`"]);
     run("negative_lights=0").expect(0);
 }
 
