@@ -1,7 +1,8 @@
 //! Names of features: what a scene may have, and what a node may require of the device.
 
 /// Every feature that a scene reports and that `Feature("…")` conditions can test.
-pub const KNOWN: &[&str] = &["textures", "glossy", "moving_objects", "moving_lights", "moving_camera", "several_lights", "normals"];
+pub const KNOWN: &[&str] =
+    &["textures", "glossy", "moving_objects", "deforming_objects", "moving_lights", "moving_camera", "several_lights", "normals"];
 
 /// Device features that a node's `requires` can name: those of wgpu that change what a shader may do.
 pub const DEVICE: &[&str] = &[

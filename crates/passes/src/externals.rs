@@ -35,8 +35,8 @@ const ENTRIES: &[Entry] = &[
         "LightView",
         "what the lights see, in their order: one view of a spot or directional light, six of a point light; a dark one if there are none",
     ),
-    buffer("scene_vertices", "Vertex", "vertices of all meshes, object space"),
-    buffer("scene_triangles", "Triangle", "triangles of all objects"),
+    buffer("scene_vertices", "Vertex", "vertices of all meshes at this time, object space"),
+    buffer("scene_triangles", "Triangle", "triangles of all objects at this time; those beyond `scene_info.triangle_count` have no area"),
     buffer("scene_objects", "Object", "transforms of all objects at this time"),
     buffer("scene_materials", "Material", "linear albedo, specular colour and exponent, texture of all materials"),
 ];
@@ -75,8 +75,8 @@ pub fn descriptions(scene: &Scene) -> BTreeMap<String, ResourceDesc> {
     let count = |name: &str| match name {
         "scene_lights" => scene.lights.len(),
         "scene_light_views" => scene.light_view_count(),
-        "scene_vertices" => scene.meshes.iter().map(|m| m.vertices.len()).sum(),
-        "scene_triangles" => scene.triangle_count(),
+        "scene_vertices" => scene.room.vertices,
+        "scene_triangles" => scene.room.triangles,
         "scene_objects" => scene.objects.len(),
         _ => scene.materials.len(),
     };
@@ -164,6 +164,10 @@ impl SceneUpload {
         for (name, bytes) in parts {
             self.set(gpu, externals, name, bytes)?;
         }
+        if scene.deforms() {
+            self.set(gpu, externals, "scene_vertices", cast_slice(&scene.gpu_vertices_at(state)))?;
+            self.set(gpu, externals, "scene_triangles", cast_slice(&scene.gpu_triangles_at(state)))?;
+        }
         Ok(())
     }
 
@@ -186,8 +190,10 @@ impl SceneUpload {
 
 fn upload_static(gpu: &Gpu, externals: &mut Externals, scene: &Scene) -> Result<(), Fault> {
     let mut set = |name: &str, element: &str, bytes: &[u8]| externals.set_buffer(gpu, name, element, size_of_element(element), bytes);
-    set("scene_vertices", "Vertex", cast_slice(&scene.gpu_vertices()))?;
-    set("scene_triangles", "Triangle", cast_slice(&scene.gpu_triangles()))?;
+    if !scene.deforms() {
+        set("scene_vertices", "Vertex", cast_slice(&scene.gpu_vertices()))?;
+        set("scene_triangles", "Triangle", cast_slice(&scene.gpu_triangles()))?;
+    }
     set("scene_materials", "Material", cast_slice(&scene.gpu_materials()))?;
     let layers = texture_layers(scene);
     let layers: Vec<&[u8]> = layers.iter().map(Vec::as_slice).collect();

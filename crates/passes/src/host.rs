@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use manylight_gpu::HostNodes;
-use manylight_scene::Scene;
+use manylight_scene::{Scene, SceneState};
 
 use crate::{bvh, points_static};
 
@@ -14,8 +14,9 @@ pub struct HostScene {
     pub scene: Arc<Scene>,
     /// Seed of everything random.
     pub seed: u32,
-    /// The scene's time in this frame, seconds. A node that depends on it names what moves (`scene_objects`) as an input, and runs when that changes.
-    pub time: f64,
+    /// The scene in this frame. A node that depends on it names what changes (`scene_objects`, `scene_vertices`) as an input, and runs when
+    /// that does.
+    pub state: SceneState,
 }
 
 /// Every node of this crate that is written in Rust.

@@ -1,4 +1,4 @@
-//! The host node `points/static`: scene points made once, when the scene or a parameter changes.
+//! The host node `points/static`: scene points made once, when the scene or a parameter changes, and again when an object deforms.
 
 use manylight_gpu::{HostContext, HostError, HostKind, HostNode};
 use manylight_scene::points::{PointMethod, PointOptions, Smoothness, generate};
@@ -9,7 +9,11 @@ use crate::host::HostScene;
 pub const KIND: HostKind = HostKind { name: "points/static", declaration: DECLARATION, make: || Box::new(PointsStatic) };
 
 const DECLARATION: &str = r#"Node(
-    doc: "Points on the surfaces of the scene, made on the host when the scene or a parameter changes; they ride on their objects ([ACRSM] 5.2 Static Tessellation).",
+    doc: "Points on the surfaces of the scene, made on the host when the scene or a parameter changes; they ride on their objects ([ACRSM] 5.2 Static Tessellation). Points cannot ride on objects that deform: where there are some, all points are made again whenever they do, and `points/dynamic` does that faster.",
+    inputs: {
+        "scene_vertices": Buffer(of: "Vertex", doc: "of objects that deform: when they change, all points are made again"),
+        "scene_triangles": Buffer(of: "Triangle", doc: "as the vertices"),
+    },
     outputs: {
         "points": Buffer(of: "ScenePoint", doc: "object space, with the area each stands for; area 0: unused"),
     },
@@ -42,7 +46,7 @@ impl HostNode for PointsStatic {
             _ => PointMethod::Area { count },
         };
         let options = PointOptions { method, seed: whole("seed")?.wrapping_add(scene.seed) };
-        let points = generate(&scene.scene, &options).map_err(|e| HostError::new(e.to_string()))?;
+        let points = generate(&scene.scene, &scene.state.deformed, &options).map_err(|e| HostError::new(e.to_string()))?;
         let capacity = ctx.count("points")?.min(count as usize);
         if points.len() > capacity {
             return Err(HostError::new(format!(

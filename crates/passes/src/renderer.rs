@@ -98,23 +98,31 @@ struct LoadedScene {
     host: HostScene,
     upload: SceneUpload,
     externals: Externals,
+    /// Whether the plan is made for less geometry than there is room for now.
+    outgrown: bool,
 }
 
 impl LoadedScene {
-    fn new(source: SceneSource, scene: Scene, seed: u32) -> Self {
-        Self {
-            source,
-            host: HostScene { scene: Arc::new(scene), seed, time: 0.0 },
-            upload: SceneUpload::new(),
-            externals: Externals::new(),
+    /// A scene as it is at a time.
+    fn new(source: SceneSource, mut scene: Scene, seed: u32, time: f64) -> Self {
+        let state = scene.sample(time);
+        scene.make_room(&state);
+        let host = HostScene { scene: Arc::new(scene), seed, state };
+        Self { source, host, upload: SceneUpload::new(), externals: Externals::new(), outgrown: false }
+    }
+
+    /// Goes to another time.
+    fn go_to(&mut self, time: f64) {
+        self.host.state = self.host.scene.sample(time);
+        let HostScene { scene, state, .. } = &mut self.host;
+        if !scene.has_room(state) {
+            self.outgrown = Arc::make_mut(scene).make_room(state);
         }
     }
 
     fn upload(&mut self, gpu: &Gpu, size: (u32, u32), frame: &gpu_data::Frame) -> Result<(), Fault> {
-        self.host.time = f64::from(frame.time);
-        let state = self.host.scene.sample(self.host.time);
         let aspect = size.0 as f32 / size.1 as f32;
-        self.upload.upload(gpu, &mut self.externals, &self.host.scene, &state, frame, aspect)
+        self.upload.upload(gpu, &mut self.externals, &self.host.scene, &self.host.state, frame, aspect)
     }
 
     /// Changes with the scene and with the seed.
@@ -158,7 +166,7 @@ impl Renderer {
     /// As [`Renderer::new`].
     pub fn with(gpu: &Gpu, documents: Documents, source: SceneSource, scene: Scene, settings: Settings) -> Result<Self, RenderError> {
         let hosts = host::nodes();
-        let mut scene = LoadedScene::new(source, scene, settings.seed);
+        let mut scene = LoadedScene::new(source, scene, settings.seed, 0.0);
         let plan = documents.plan(&plan_input(&settings, &scene.host.scene))?;
         scene.upload(gpu, settings.size, &gpu_data::Frame { seed: settings.seed, ..Default::default() })?;
         let (frame, _) = build(gpu, &plan, &scene, &hosts, None, &settings)?;
@@ -166,6 +174,9 @@ impl Renderer {
     }
 
     /// Renders the scene at a time in seconds. Returns when the frame is submitted, not when it is done.
+    ///
+    /// Where objects that deform have more triangles than was foreseen, buffers grow and the plan is made anew, which takes as long as the
+    /// change of a parameter.
     ///
     /// # Errors
     /// A host node failed, the scene outgrew the device, or the device is lost.
@@ -176,7 +187,12 @@ impl Renderer {
             time: time as f32,
             delta_time: self.last_time.map_or(0.0, |last| (time - last) as f32),
         };
+        self.scene.go_to(f64::from(frame.time));
         self.scene.upload(&self.gpu, self.settings.size, &frame)?;
+        if self.scene.outgrown {
+            self.change(None, None, None)?;
+            self.scene.outgrown = false;
+        }
         let data = HostData::new(&self.scene.host, self.scene.stamp());
         self.frame.record_and_submit(&self.gpu, &self.scene.externals, data)?;
         self.last_time = Some(time);
@@ -319,11 +335,12 @@ impl Renderer {
     ) -> Result<ReloadReport, Diagnostics> {
         let new_settings = settings.as_ref().unwrap_or(&self.settings);
         let new_documents = documents.as_ref().unwrap_or(&self.documents);
-        let mut new_scene = scene.map(|scene| LoadedScene::new(self.scene.source.clone(), scene, new_settings.seed));
+        let time = self.last_time.unwrap_or(0.0) as f32;
+        let mut new_scene = scene.map(|scene| LoadedScene::new(self.scene.source.clone(), scene, new_settings.seed, time.into()));
         let described = new_scene.as_ref().map_or(&self.scene.host.scene, |s| &s.host.scene);
         let plan = new_documents.plan(&plan_input(new_settings, described))?;
         if let Some(scene) = &mut new_scene {
-            let frame = gpu_data::Frame { seed: new_settings.seed, time: self.last_time.unwrap_or(0.0) as f32, ..Default::default() };
+            let frame = gpu_data::Frame { seed: new_settings.seed, time, ..Default::default() };
             scene.upload(&self.gpu, new_settings.size, &frame).map_err(|f| Diagnostics(vec![Diagnostic::error_nowhere(f.to_string())]))?;
         }
         let on_gpu = new_scene.as_ref().unwrap_or(&self.scene);

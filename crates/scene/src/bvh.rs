@@ -4,10 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2_from_tris};
 
-use crate::{
-    gpu_data::{self, Object},
-    scene::Scene,
-};
+use crate::{gpu_data, scene::Scene, state::SceneState};
 
 /// A box and what is in it: two nodes, or some triangles.
 #[repr(C)]
@@ -53,14 +50,15 @@ pub struct Bvh {
 }
 
 impl Bvh {
-    /// Builds the hierarchy over the scene's triangles where `objects` puts them. About 0.1 s for 10⁵ triangles.
-    pub fn build(scene: &Scene, objects: &[Object]) -> Self {
-        let vertices = scene.gpu_vertices();
-        let place =
-            |vertex: u32, object: u32| objects[object as usize].world_from_object.transform_point3(vertices[vertex as usize].position);
+    /// Builds the hierarchy over the scene's triangles as `state` has them. About 0.1 s for 10⁵ triangles.
+    pub fn build(scene: &Scene, state: &SceneState) -> Self {
+        let vertices = scene.vertices_of(&state.deformed);
+        let place = |vertex: u32, object: u32| {
+            state.objects[object as usize].world_from_object.transform_point3(vertices[vertex as usize].position)
+        };
         let mut corners = Vec::new();
         let mut sources = Vec::new();
-        for (index, t) in scene.gpu_triangles().into_iter().enumerate() {
+        for (index, t) in scene.triangles_of(&state.deformed).into_iter().enumerate() {
             let [a, b, c] = [t.a, t.b, t.c].map(|vertex| place(vertex, t.object));
             if (b - a).cross(c - a).length_squared() > 0.0 {
                 corners.push(obvhs::triangle::Triangle { v0: a.into(), v1: b.into(), v2: c.into() });

@@ -21,6 +21,7 @@
 //! - [`gpu_data`]: the structures that shaders read, and their layouts.
 //! - [`files`]: reading from disk, from the program itself, or from anywhere else.
 //! - [`bounds`]: axis-aligned boxes.
+//! - [`deform`]: meshes whose shape changes, by key frames or as metaballs.
 //! - [`bvh`]: a hierarchy of boxes over all triangles, for shaders that trace rays.
 //!
 //! # Scene files
@@ -35,6 +36,11 @@
 //!             transform: (translate: (1.0, 0.5, 2.0), rotate_deg: (axis: (0.0, 1.0, 0.0), angle: 30.0), scale: 0.5),
 //!             motion: [(time: 0.0), (time: 2.0, translate: (3.0, 0.5, 2.0))], // what a key leaves out is as in `transform`
 //!             repeat: loop,                              // or clamp (default)
+//!         ),
+//!         Mesh(file: "flag_0.obj", motion: [(time: 0.0), (time: 1.0, file: "flag_1.obj")]), // a key with another file: its shape changes
+//!         Metaballs(
+//!             balls: [(position: (0.0, 1.0, 0.0), radius: 0.5, strength: 1.0, motion: [(time: 0.0), (time: 2.0, radius: 0.8)])],
+//!             level: 0.25, cells: 32, material: "clay",      // and `name`, `transform`, `motion`, `repeat` as of a mesh
 //!         ),
 //!     ],
 //!     camera: (origin: (0.0, 1.0, 5.0), target: (0.0, 1.0, 0.0), up: (0.0, 1.0, 0.0), fov_x_deg: 50.0),
@@ -55,6 +61,7 @@
 
 pub mod bounds;
 pub mod bvh;
+pub mod deform;
 mod file;
 pub mod files;
 mod fit;
@@ -67,6 +74,7 @@ mod random;
 pub mod scene;
 pub mod state;
 
+pub use deform::{Deformation, Deformed, Metaballs};
 pub use import::{DEFAULT_SHININESS, MAX_TEXTURE_SIZE, Material, Mesh, MeshStatistics, MeshTriangle, Textures};
 pub use scene::{Light, LightShape, Scene, SceneObject};
 pub use state::SceneState;

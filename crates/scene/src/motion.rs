@@ -28,7 +28,7 @@ pub struct Track<T> {
     repeat: Repeat,
 }
 
-impl<T: Interpolate> Track<T> {
+impl<T> Track<T> {
     /// A value that never changes.
     pub fn fixed(value: T) -> Self {
         Self { keys: vec![(0.0, value)], repeat: Repeat::Clamp }
@@ -38,6 +38,12 @@ impl<T: Interpolate> Track<T> {
     pub fn keyed(keys: Vec<(f64, T)>, repeat: Repeat) -> Option<Self> {
         let ordered = keys.windows(2).all(|pair| pair[0].0 < pair[1].0) && keys.iter().all(|key| key.0.is_finite());
         (ordered && !keys.is_empty()).then_some(Self { keys, repeat })
+    }
+
+    /// The same times with other values.
+    #[must_use]
+    pub fn map<U>(self, convert: impl Fn(T) -> U) -> Track<U> {
+        Track { keys: self.keys.into_iter().map(|(time, value)| (time, convert(value))).collect(), repeat: self.repeat }
     }
 
     /// Times and values.
@@ -50,8 +56,9 @@ impl<T: Interpolate> Track<T> {
         self.keys.len() > 1
     }
 
-    /// The value at a time in seconds. A time that is not finite counts as 0.
-    pub fn at(&self, time: f64) -> T {
+    /// The values before and after a time in seconds, and which share of the way between them it is (0…1, without 1). Where the track stands
+    /// still, and on a key, both are the same. A time that is not finite counts as 0.
+    pub fn around(&self, time: f64) -> (&T, &T, f32) {
         let (first, last) = (&self.keys[0], &self.keys[self.keys.len() - 1]);
         let mut time = if time.is_finite() { time } else { 0.0 };
         if self.repeat == Repeat::Loop && self.moves() {
@@ -59,9 +66,19 @@ impl<T: Interpolate> Track<T> {
         }
         let next = self.keys.partition_point(|key| key.0 <= time);
         match (next.checked_sub(1).map(|i| &self.keys[i]), self.keys.get(next)) {
-            (Some(a), Some(b)) => a.1.interpolate(&b.1, ((time - a.0) / (b.0 - a.0)) as f32),
-            (None, _) => first.1.clone(),
-            (_, None) => last.1.clone(),
+            (Some(a), Some(b)) if a.0 < time => (&a.1, &b.1, ((time - a.0) / (b.0 - a.0)) as f32),
+            (Some(a), _) => (&a.1, &a.1, 0.0),
+            (None, _) => (&first.1, &first.1, 0.0),
+        }
+    }
+}
+
+impl<T: Interpolate> Track<T> {
+    /// The value at a time in seconds. A time that is not finite counts as 0.
+    pub fn at(&self, time: f64) -> T {
+        match self.around(time) {
+            (before, _, 0.0) => before.clone(),
+            (before, after, fraction) => before.interpolate(after, fraction),
         }
     }
 }

@@ -5,17 +5,20 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use bytemuck::Zeroable;
 use glam::Vec3;
 use manylight_graph::diagnostics::Diagnostics;
 
 use crate::{
     bounds::Bounds,
+    deform::{Deformation, Deformed, Room},
     file,
     files::{Disk, FileReader},
     gpu_data::{self, Falloff},
     import::{Material, Mesh, Textures},
     lights,
     motion::{CameraPose, LightPose, Pose, Repeat, Track},
+    state::SceneState,
 };
 
 /// A mesh somewhere in the scene.
@@ -82,6 +85,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// The camera.
     pub camera: Track<CameraPose>,
+    /// What buffers need for its geometry at all times, as far as is known.
+    pub room: Room,
     /// What was mended or made up while loading.
     pub warnings: Diagnostics,
     /// Every file read or looked for: when one changes, the scene may.
@@ -89,6 +94,9 @@ pub struct Scene {
     /// Hash of the contents of all files: equal hash, equal scene.
     pub hash: u64,
 }
+
+/// Room that has become too small grows to what is needed and one part in so many more, so that it does not grow in every frame.
+const ROOM_TO_GROW: usize = 4;
 
 impl Scene {
     /// Loads a scene file (`.ron`) or a mesh (`.obj`) from disk.
@@ -109,15 +117,18 @@ impl Scene {
 
     /// What the scene has, for conditions in pipelines.
     pub fn features(&self) -> BTreeMap<String, bool> {
-        let normals = self.meshes.iter().flat_map(|mesh| &mesh.vertices).any(|vertex| vertex.normal != Vec3::ZERO);
+        let smooth = |mesh: &Mesh| {
+            matches!(mesh.deformation, Some(Deformation::Metaballs(_))) || mesh.vertices.iter().any(|vertex| vertex.normal != Vec3::ZERO)
+        };
         let features = [
             ("textures", self.textures.count > 0),
             ("glossy", self.materials.iter().any(|material| material.specular != Vec3::ZERO)),
             ("moving_objects", self.objects.iter().any(|object| object.pose.moves())),
+            ("deforming_objects", self.deforms()),
             ("moving_lights", self.lights.iter().any(|light| light.pose.moves())),
             ("moving_camera", self.camera.moves()),
             ("several_lights", self.lights.len() > 1),
-            ("normals", normals),
+            ("normals", self.meshes.iter().any(smooth)),
         ];
         features.into_iter().map(|(name, on)| (name.to_owned(), on)).collect()
     }
@@ -145,9 +156,19 @@ impl Scene {
         Ok(())
     }
 
-    /// Number of triangles of all objects.
+    /// Whether the shape of a mesh changes.
+    pub fn deforms(&self) -> bool {
+        self.meshes.iter().any(|mesh| mesh.deformation.is_some())
+    }
+
+    /// A mesh among those that `deformed` has in other shapes.
+    pub fn shape<'a>(&'a self, mesh: usize, deformed: &'a [Deformed]) -> &'a Mesh {
+        deformed.iter().find(|deformed| deformed.mesh == mesh).map_or(&self.meshes[mesh], |deformed| &deformed.shape)
+    }
+
+    /// Number of triangles of all objects at time 0.
     pub fn triangle_count(&self) -> usize {
-        self.objects.iter().map(|object| self.meshes[object.mesh].triangles.len()).sum()
+        self.used(&[]).triangles
     }
 
     /// Number of views of all lights, at least one: [`SceneState::light_views`](crate::SceneState::light_views).
@@ -155,23 +176,71 @@ impl Scene {
         self.lights.iter().map(|light| lights::view_count(&light.shape)).sum::<usize>().max(1)
     }
 
-    /// The vertices of all meshes, one mesh after the other.
-    pub fn gpu_vertices(&self) -> Vec<gpu_data::Vertex> {
-        self.meshes.iter().flat_map(|mesh| &mesh.vertices).copied().collect()
+    /// Vertices and triangles that there are in these shapes.
+    pub(crate) fn used(&self, deformed: &[Deformed]) -> Room {
+        Room {
+            vertices: (0..self.meshes.len()).map(|mesh| self.shape(mesh, deformed).vertices.len()).sum(),
+            triangles: self.objects.iter().map(|object| self.shape(object.mesh, deformed).triangles.len()).sum(),
+        }
     }
 
-    /// The triangles of all objects, one object after the other, with indices into [`Scene::gpu_vertices`].
+    /// Whether the geometry of `state` fits into [`Scene::room`].
+    pub fn has_room(&self, state: &SceneState) -> bool {
+        state.deformed.is_empty() || self.used(&state.deformed).max(self.room) == self.room
+    }
+
+    /// Enlarges [`Scene::room`] if the geometry of `state` does not fit. Returns whether it did not: sizes of buffers, and plans that
+    /// follow them, are others then.
+    pub fn make_room(&mut self, state: &SceneState) -> bool {
+        if self.has_room(state) {
+            return false;
+        }
+        let used = self.used(&state.deformed);
+        let spare = |count: usize| count + count / ROOM_TO_GROW;
+        self.room = self.room.max(Room { vertices: spare(used.vertices), triangles: spare(used.triangles) });
+        true
+    }
+
+    /// The vertices of all meshes at time 0, one mesh after the other.
+    pub fn gpu_vertices(&self) -> Vec<gpu_data::Vertex> {
+        self.vertices_of(&[])
+    }
+
+    /// The triangles of all objects at time 0, one object after the other, with indices into [`Scene::gpu_vertices`].
     pub fn gpu_triangles(&self) -> Vec<gpu_data::Triangle> {
+        self.triangles_of(&[])
+    }
+
+    /// The vertices of all meshes, one mesh after the other, with zeros up to the room there is.
+    pub fn gpu_vertices_at(&self, state: &SceneState) -> Vec<gpu_data::Vertex> {
+        let mut vertices = self.vertices_of(&state.deformed);
+        vertices.resize(vertices.len().max(self.room.vertices), gpu_data::Vertex::zeroed());
+        vertices
+    }
+
+    /// The triangles of all objects, one object after the other, with indices into [`Scene::gpu_vertices_at`]. Then, up to the room there
+    /// is, triangles without area at one vertex, that nothing sees: `SceneInfo::triangle_count` does not count them.
+    pub fn gpu_triangles_at(&self, state: &SceneState) -> Vec<gpu_data::Triangle> {
+        let mut triangles = self.triangles_of(&state.deformed);
+        triangles.resize(triangles.len().max(self.room.triangles), gpu_data::Triangle::zeroed());
+        triangles
+    }
+
+    pub(crate) fn vertices_of(&self, deformed: &[Deformed]) -> Vec<gpu_data::Vertex> {
+        (0..self.meshes.len()).flat_map(|mesh| &self.shape(mesh, deformed).vertices).copied().collect()
+    }
+
+    pub(crate) fn triangles_of(&self, deformed: &[Deformed]) -> Vec<gpu_data::Triangle> {
         let mut first_vertex = Vec::with_capacity(self.meshes.len());
         let mut next = 0;
-        for mesh in &self.meshes {
+        for mesh in 0..self.meshes.len() {
             first_vertex.push(next);
-            next += mesh.vertices.len() as u32;
+            next += self.shape(mesh, deformed).vertices.len() as u32;
         }
-        let mut triangles = Vec::with_capacity(self.triangle_count());
+        let mut triangles = Vec::with_capacity(self.used(deformed).triangles);
         for (index, object) in self.objects.iter().enumerate() {
             let first = first_vertex[object.mesh];
-            triangles.extend(self.meshes[object.mesh].triangles.iter().map(|triangle| {
+            triangles.extend(self.shape(object.mesh, deformed).triangles.iter().map(|triangle| {
                 let [a, b, c] = triangle.vertices.map(|i| first + i);
                 gpu_data::Triangle { a, b, c, object: index as u32, material: triangle.material }
             }));

@@ -4,11 +4,12 @@ use glam::{DMat3, DMat4, DVec3, Mat4};
 
 use crate::{
     bounds::Bounds,
+    deform::Deformed,
     gpu_data::{Light, LightView, Object, SceneInfo, View},
     import::Mesh,
     lights::{self, NEAR},
     motion::{CameraPose, Pose},
-    scene::{Extent, Scene},
+    scene::{Extent, Scene, SceneObject},
 };
 
 /// Everything that changes with time, ready for the GPU.
@@ -18,13 +19,15 @@ pub struct SceneState {
     pub time: f64,
     /// Where the objects are.
     pub objects: Vec<Object>,
+    /// The meshes that deform, in the order of the scene's.
+    pub deformed: Vec<Deformed>,
     /// The lights, with their shares of the power.
     pub lights: Vec<Light>,
     /// What the lights see, in the order of the lights: one view of a spot or directional light, six of a point light. Without lights a dark one.
     pub light_views: Vec<LightView>,
     /// The camera; [`SceneState::camera_view`] makes a view of it.
     pub camera: CameraPose,
-    /// Around all objects, world space. Tight around objects that stand still, loose around others.
+    /// Around all objects, world space. Tight around objects that stand still or deform, loose around others.
     pub bounds: Bounds,
     /// Extent and statistics.
     pub info: SceneInfo,
@@ -38,12 +41,19 @@ const NEAR_AT_LEAST: f64 = 1e-6;
 impl Scene {
     /// The scene at a time in seconds.
     pub fn sample(&self, time: f64) -> SceneState {
+        let at = |(mesh, of): (usize, &Mesh)| of.at(time).map(|shape| Deformed { mesh, shape });
+        let deformed: Vec<Deformed> = self.meshes.iter().enumerate().filter_map(at).collect();
         let mut bounds = Bounds::EMPTY;
         let mut area = 0.0;
         let mut objects = Vec::with_capacity(self.objects.len());
         for object in &self.objects {
             let pose = object.pose.at(time);
-            let extent = if object.pose.moves() { extent_moving(&self.meshes[object.mesh], &pose) } else { object.at_rest };
+            let mesh = &self.meshes[object.mesh];
+            let extent = match (mesh.deformation.is_some(), object.pose.moves()) {
+                (true, _) => extent(self.shape(object.mesh, &deformed), &pose),
+                (false, true) => extent_moving(mesh, &pose),
+                (false, false) => object.at_rest,
+            };
             bounds = bounds.union(extent.bounds);
             area += extent.area;
             objects.push(Object {
@@ -51,25 +61,31 @@ impl Scene {
                 normal_from_object: Mat4::from_mat3(normal_from_object(&pose).as_mat3()),
             });
         }
+        if bounds.is_empty() {
+            bounds = reach(&self.meshes, &self.objects, time);
+        }
         let light_poses: Vec<_> = self.lights.iter().map(|light| light.pose.at(time)).collect();
-        let statistics = |pick: fn(&Mesh) -> f64| self.objects.iter().map(move |object| pick(&self.meshes[object.mesh]));
+        let mesh_now = |object: &SceneObject| self.shape(object.mesh, &deformed);
+        let statistics = |pick: fn(&Mesh) -> f64| self.objects.iter().map(mesh_now).map(pick);
+        // Infinite where there is no triangle.
+        let least = |pick: fn(&Mesh) -> f64| Some(statistics(pick).fold(f64::INFINITY, f64::min)).filter(|least| least.is_finite());
         let info = SceneInfo {
             bounds_min: bounds.min.as_vec3(),
             diagonal: bounds.diagonal() as f32,
             bounds_max: bounds.max.as_vec3(),
             total_area: area as f32,
-            area_min: statistics(|mesh| mesh.statistics.area_min).fold(f64::INFINITY, f64::min) as f32,
+            area_min: least(|mesh| mesh.statistics.area_min).unwrap_or(0.0) as f32,
             area_max: statistics(|mesh| mesh.statistics.area_max).fold(0.0, f64::max) as f32,
-            edge_min: statistics(|mesh| mesh.statistics.edge_min).fold(f64::INFINITY, f64::min) as f32,
+            edge_min: least(|mesh| mesh.statistics.edge_min).unwrap_or(0.0) as f32,
             edge_max: statistics(|mesh| mesh.statistics.edge_max).fold(0.0, f64::max) as f32,
-            triangle_count: self.triangle_count() as u32,
+            triangle_count: self.used(&deformed).triangles as u32,
             object_count: self.objects.len() as u32,
             light_count: self.lights.len() as u32,
             texture_count: self.textures.count,
         };
         let lights = lights::on_gpu(&self.lights, &light_poses, &bounds);
         let light_views = lights::views(&lights, &light_poses, &bounds);
-        SceneState { time, objects, lights, light_views, camera: self.camera.at(time), bounds, info }
+        SceneState { time, objects, deformed, lights, light_views, camera: self.camera.at(time), bounds, info }
     }
 }
 
@@ -98,6 +114,12 @@ pub(crate) fn extent(mesh: &Mesh, pose: &Pose) -> Extent {
         corners.into_iter().for_each(|corner| bounds.add(corner));
     }
     Extent { bounds, area }
+}
+
+/// Bounds of a scene of nothing but metaballs without a surface: around where they might have one.
+pub(crate) fn reach(meshes: &[Mesh], objects: &[SceneObject], time: f64) -> Bounds {
+    let of = |object: &SceneObject| meshes[object.mesh].reach().transformed(&object.pose.at(time).world_from_object());
+    objects.iter().fold(Bounds::EMPTY, |bounds, object| bounds.union(of(object)))
 }
 
 /// Extent of a mesh that moves: its bounds are those of the turned bounding box, so that a frame does not visit every vertex.

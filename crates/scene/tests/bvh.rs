@@ -13,7 +13,7 @@ fn asset(name: &str) -> Scene {
 fn every_triangle_lies_in_one_leaf_and_in_all_boxes_above_it() {
     let scene = asset("moving.ron");
     for time in [0.0, 1.7] {
-        let bvh = Bvh::build(&scene, &scene.sample(time).objects);
+        let bvh = Bvh::build(&scene, &scene.sample(time));
         assert_eq!(bvh.triangles.len(), scene.triangle_count());
         assert!(bvh.nodes.len() < 2 * bvh.triangles.len());
         let mut seen = BTreeSet::new();
@@ -42,7 +42,7 @@ fn every_triangle_lies_in_one_leaf_and_in_all_boxes_above_it() {
 #[test]
 fn it_follows_objects_that_move() {
     let scene = asset("moving.ron");
-    let at = |time| Bvh::build(&scene, &scene.sample(time).objects).triangles;
+    let at = |time| Bvh::build(&scene, &scene.sample(time)).triangles;
     let mean = |time| at(time).iter().map(|t| f64::from(t.a.y)).sum::<f64>();
     assert!(mean(2.5) > mean(0.0) + 1.0, "the ball goes up");
 }

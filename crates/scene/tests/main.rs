@@ -4,6 +4,7 @@
 
 mod assets;
 mod bvh;
+mod deform;
 mod gpu_data;
 mod import;
 mod memory;

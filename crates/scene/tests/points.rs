@@ -57,7 +57,7 @@ fn counts_and_areas_are_exact() {
     for scene in [&room(), &moved] {
         let (total, centroid) = surface(scene);
         for count in [1, 2, 7, 1000, 64_000] {
-            let points = generate(scene, &area(count, 5)).unwrap();
+            let points = generate(scene, &[], &area(count, 5)).unwrap();
             assert_eq!(points.len(), count as usize);
             let sum: f64 = points.iter().map(|p| f64::from(p.area)).sum();
             assert!((sum / total - 1.0).abs() < 1e-6, "{sum} of {total}");
@@ -73,7 +73,7 @@ fn counts_and_areas_are_exact() {
 fn points_lie_on_their_triangles_with_their_normals() {
     let scene = room();
     for options in [area(5000, 3), tessellation(2, 12, Smoothness::Third)] {
-        let points = generate(&scene, &options).unwrap();
+        let points = generate(&scene, &[], &options).unwrap();
         let mesh = &scene.meshes[0];
         for point in &points {
             assert!(point.normal.is_normalized());
@@ -93,7 +93,7 @@ fn points_lie_on_their_triangles_with_their_normals() {
 fn the_same_seed_gives_the_same_points() {
     let scene = room();
     for method in [PointMethod::Area { count: 3000 }, PointMethod::Tessellation { min: 3, max: 9, smoothness: Smoothness::Fifth }] {
-        let points = |seed| generate(&scene, &PointOptions { method, seed }).unwrap();
+        let points = |seed| generate(&scene, &[], &PointOptions { method, seed }).unwrap();
         assert_eq!(points(7), points(7));
         assert_ne!(points(7), points(8));
     }
@@ -109,7 +109,7 @@ fn every_map_gets_an_even_share_of_the_scene() {
         usize::from(above.x) + 2 * usize::from(above.y) + 4 * usize::from(above.z)
     };
     for options in [area(64_000, 1), area(64_000, 2), tessellation(5, 64, Smoothness::Third)] {
-        let points = generate(&scene, &options).unwrap();
+        let points = generate(&scene, &[], &options).unwrap();
         let mut share = [0.0_f64; 8];
         points.iter().for_each(|point| share[cell(point)] += 1.0 / points.len() as f64);
         for maps in [16, 64, 100, 233, 377, 512] {
@@ -149,7 +149,7 @@ fn the_rows_of_a_grid_do_not_meet_the_number_of_maps() {
         }
     }
     let scene = obj(&text).unwrap();
-    let points = generate(&scene, &area(8192, 1)).unwrap();
+    let points = generate(&scene, &[], &area(8192, 1)).unwrap();
     for maps in [64, 128] {
         for map in 0..maps {
             let columns: std::collections::BTreeSet<_> =
@@ -163,7 +163,7 @@ fn the_rows_of_a_grid_do_not_meet_the_number_of_maps() {
 fn tessellation_follows_the_sizes_of_triangles() {
     // Areas 0.5 and 50: the least and the greatest factor.
     let scene = obj("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 10 0 1\nv 0 10 1\nf 1 2 3\nf 4 5 6\n").unwrap();
-    let points = generate(&scene, &tessellation(5, 64, Smoothness::Third)).unwrap();
+    let points = generate(&scene, &[], &tessellation(5, 64, Smoothness::Third)).unwrap();
     let small = points.iter().filter(|point| point.position.z == 0.0).count();
     let large = points.len() - small;
     // The walk takes steps of 2/n in n rows, n = t_e + t_A from 64 + 49 (the legs) to 64 + 64: about n²/4 points.
@@ -187,7 +187,7 @@ fn smooth_steps_are_polynomials() {
 #[test]
 fn equal_triangles_get_the_greatest_factor() {
     let scene = obj(crate::memory::TRIANGLE).unwrap();
-    let points = generate(&scene, &tessellation(1, 8, Smoothness::Third)).unwrap();
+    let points = generate(&scene, &[], &tessellation(1, 8, Smoothness::Third)).unwrap();
     // The longest edge has the greatest factor as well, the shorter ones the least.
     assert!(points.len() > 20, "{}", points.len());
 }
@@ -195,21 +195,24 @@ fn equal_triangles_get_the_greatest_factor() {
 #[test]
 fn too_much_is_refused_before_it_is_made() {
     let scene = room();
-    assert_eq!(generate(&scene, &area(u32::MAX, 0)), Err(PointError::TooMany { wanted: u32::MAX.into(), lower: "the number of points" }));
+    assert_eq!(
+        generate(&scene, &[], &area(u32::MAX, 0)),
+        Err(PointError::TooMany { wanted: u32::MAX.into(), lower: "the number of points" })
+    );
     for max in [100_000, u32::MAX] {
-        let fault = generate(&scene, &tessellation(1, max, Smoothness::Third)).unwrap_err();
+        let fault = generate(&scene, &[], &tessellation(1, max, Smoothness::Third)).unwrap_err();
         assert!(matches!(fault, PointError::TooMany { wanted, .. } if wanted > MAX_POINTS), "{fault}");
     }
-    assert_eq!(generate(&scene, &tessellation(0, 4, Smoothness::Third)), Err(PointError::Factors { min: 0, max: 4 }));
-    assert_eq!(generate(&scene, &tessellation(5, 4, Smoothness::Third)), Err(PointError::Factors { min: 5, max: 4 }));
-    assert_eq!(generate(&scene, &area(0, 0)), Ok(Vec::new()));
+    assert_eq!(generate(&scene, &[], &tessellation(0, 4, Smoothness::Third)), Err(PointError::Factors { min: 0, max: 4 }));
+    assert_eq!(generate(&scene, &[], &tessellation(5, 4, Smoothness::Third)), Err(PointError::Factors { min: 5, max: 4 }));
+    assert_eq!(generate(&scene, &[], &area(0, 0)), Ok(Vec::new()));
 }
 
 #[test]
 fn objects_without_size_get_no_points() {
     let scene = ron("Scene(meshes: [\"room.obj\", Mesh(file: \"tri.obj\", motion: [(time: 0.0, scale: 0.0), (time: 1.0)])])").unwrap();
-    assert!(generate(&scene, &area(1000, 0)).unwrap().iter().all(|point| point.object == 0));
-    let points = generate(&scene, &tessellation(5, 20, Smoothness::Third)).unwrap();
+    assert!(generate(&scene, &[], &area(1000, 0)).unwrap().iter().all(|point| point.object == 0));
+    let points = generate(&scene, &[], &tessellation(5, 20, Smoothness::Third)).unwrap();
     assert!(points.iter().any(|point| point.object == 1 && point.area == 0.0), "tessellation has them for later");
 }
 
@@ -217,7 +220,7 @@ fn objects_without_size_get_no_points() {
 fn needles_and_huge_scenes_have_finite_points() {
     for scale in ["1e-3", "1e4"] {
         let scene = obj(&format!("v 0 0 0\nv {scale} 0 0\nv {scale} 1e-6 0\nv 0 {scale} {scale}\nf 1 2 3\nf 1 2 4\n")).unwrap();
-        for point in generate(&scene, &area(100, 0)).unwrap() {
+        for point in generate(&scene, &[], &area(100, 0)).unwrap() {
             assert!(point.position.is_finite() && point.normal.is_normalized() && point.area > 0.0);
         }
     }

@@ -6,7 +6,7 @@ use crate::memory::load;
 
 const OBJ: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0 1\nv 0 1 0 1 0 0\nv 0 0 1\nvt 0 0\nvt 1\nvn 0 0 1\nusemtl a\nf 1/1/1 2/2/1 3/1/1\ng x\nusemtl b c\nf 1//1 2//1 4//1\nf -1 -2 -3 -4\nl 1 2\np 1\n";
 const MTL: &str = "newmtl a\nKd 0.5 0.5 0.5\nKs 0.1 0.1 0.1\nNs 10\nillum 2\nmap_Kd -s 1 1 1 t.png\nnewmtl b c\nKd 1 0 0\nKe 0 0 0\n";
-const RON: &str = "Scene(meshes: [\"a.obj\", Mesh(file: \"a.obj\", transform: (translate: (1, 2, 3), rotate_deg: (axis: (0, 1, 0), angle: 30)), motion: [(time: 0.0), (time: 1.5, scale: 2.0)], repeat: loop)], camera: (origin: (0, 0, 9), target: (0, 0, 0), fov_x_deg: 40.0), lights: [Spot(position: (0, 1, 0), target: (0, 0, 0), intensity: (1, 2, 3), beam_deg: 10, cutoff_deg: 20, falloff: smooth), Point(position: (0, 1, 0), intensity: 2), Directional(direction: (0, -1, 0), irradiance: 3, motion: [(time: 0), (time: 1, direction: (0, 1, 0))])], materials: {\"a\": (diffuse: 0.5)})";
+const RON: &str = "Scene(meshes: [\"a.obj\", Mesh(file: \"a.obj\", transform: (translate: (1, 2, 3), rotate_deg: (axis: (0, 1, 0), angle: 30)), motion: [(time: 0.0), (time: 1.5, scale: 2.0, file: \"b.obj\")], repeat: loop), Metaballs(balls: [(position: (0, 1, 0), radius: 1, motion: [(time: 0), (time: 1, radius: 0.5)])], level: 0.3, cells: 6, material: \"a\")], camera: (origin: (0, 0, 9), target: (0, 0, 0), fov_x_deg: 40.0), lights: [Spot(position: (0, 1, 0), target: (0, 0, 0), intensity: (1, 2, 3), beam_deg: 10, cutoff_deg: 20, falloff: smooth), Point(position: (0, 1, 0), intensity: 2), Directional(direction: (0, -1, 0), irradiance: 3, motion: [(time: 0), (time: 1, direction: (0, 1, 0))])], materials: {\"a\": (diffuse: 0.5)})";
 
 /// A text with some bytes replaced, put in, or taken out.
 fn mutated(text: &'static str) -> impl Strategy<Value = Vec<u8>> {
@@ -57,17 +57,19 @@ fn mutated(text: &'static str) -> impl Strategy<Value = Vec<u8>> {
 
 /// Whatever loads can be sampled, and gives finite numbers and indices in range.
 fn check(path: &str, obj: &[u8], mtl: &[u8], ron: &[u8]) -> Result<(), TestCaseError> {
-    let Ok(scene) = load(path, &[("a.obj", obj), ("m.mtl", mtl), ("s.ron", ron), ("t.png", b"no picture")]) else { return Ok(()) };
-    let vertices = scene.gpu_vertices();
-    for triangle in scene.gpu_triangles() {
-        for index in [triangle.a, triangle.b, triangle.c] {
-            let vertex = vertices[index as usize];
-            prop_assert!(vertex.position.is_finite() && vertex.normal.is_finite() && vertex.u.is_finite() && vertex.v.is_finite());
-        }
-        prop_assert!((triangle.material as usize) < scene.materials.len() && (triangle.object as usize) < scene.objects.len());
-    }
+    let Ok(scene) = load(path, &[("a.obj", obj), ("b.obj", obj), ("m.mtl", mtl), ("s.ron", ron), ("t.png", b"no picture")]) else {
+        return Ok(());
+    };
     for time in [0.0, 0.7, 1e9] {
         let state = scene.sample(time);
+        let vertices = scene.gpu_vertices_at(&state);
+        for triangle in scene.gpu_triangles_at(&state) {
+            for index in [triangle.a, triangle.b, triangle.c] {
+                let vertex = vertices[index as usize];
+                prop_assert!(vertex.position.is_finite() && vertex.normal.is_finite() && vertex.u.is_finite() && vertex.v.is_finite());
+            }
+            prop_assert!((triangle.material as usize) < scene.materials.len() && (triangle.object as usize) < scene.objects.len());
+        }
         prop_assert!(state.info.diagonal.is_finite() && state.info.diagonal > 0.0 || state.bounds.diagonal() > 1e30);
         prop_assert!(state.camera_view(1.5).forward.is_finite());
         prop_assert_eq!(state.light_views.len(), scene.light_view_count());

@@ -42,7 +42,7 @@ fn a_whole_scene() {
     let features = scene.features();
     let on: Vec<_> = features.iter().filter(|(_, on)| **on).map(|(name, _)| name.as_str()).collect();
     assert_eq!(on, ["glossy", "several_lights"]);
-    assert_eq!(features.len(), 7);
+    assert_eq!(features.len(), 8);
 }
 
 /// Each fault alone: the text, the place that is pointed at, and words of the message.
@@ -264,4 +264,30 @@ fn bytes_that_are_no_text_are_an_error() {
     let fault = load("s.ron", &[("s.ron", &[0xff_u8, 0xfe, 0x00][..])]).unwrap_err();
     assert_says(&fault, "", &["not a text in UTF-8"]);
     assert_says(&load::<&str>("s.gltf", &[]).unwrap_err(), "", &["a scene is a `.ron` or an `.obj` file, not `.gltf`"]);
+}
+
+/// Every example of the guide's page is a scene, or a part of one.
+#[test]
+fn the_examples_of_the_guide_load() {
+    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/guide/scenes.md")).unwrap();
+    let picture = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/checker.png")).unwrap();
+    let examples: Vec<&str> = page.split("```ron\n").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
+    assert!(examples.len() >= 8, "{}", examples.len());
+    for example in examples {
+        let text = match example.split(['(', ':']).next().unwrap() {
+            "Scene" => example.to_owned(),
+            "Mesh" | "Metaballs" => format!("Scene(meshes: [{example}])"),
+            "motion" => format!("Scene(meshes: [Mesh(file: \"room.obj\", {example})])"),
+            "meshes" => format!("Scene({example})"),
+            _ => format!("Scene(meshes: [\"room.obj\"], {example})"),
+        };
+        let reader = |path: &std::path::Path| match path.extension().and_then(|extension| extension.to_str()) {
+            Some("ron") => Ok(text.clone().into_bytes()),
+            Some("png") => Ok(picture.clone()),
+            _ => Ok(ROOM.replace("usemtl walls", "usemtl white").into_bytes()),
+        };
+        let scene = Scene::load_with("s.ron", &reader).unwrap_or_else(|faults| panic!("{text}: {:?}", summary(&faults)));
+        let known = |message: &str| message.starts_with("the scene has no") || message.contains("not in the material library");
+        assert!(scene.warnings.0.iter().all(|warning| known(&warning.message)), "{:?}", summary(&scene.warnings));
+    }
 }

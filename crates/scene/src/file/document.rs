@@ -8,28 +8,22 @@ use manylight_graph::{
 
 use super::{
     light::read_light,
-    motion::{read_motion, warn_long_turns},
-    values::{albedo, checked, point, rotation, scale, vector},
+    motion::read_motion,
+    object::{ObjectEntry, read_object},
+    values::{albedo, checked, point, vector},
 };
 use crate::{
-    motion::{CameraPose, Pose, Track},
+    motion::{CameraPose, Track},
     scene::Light,
 };
 
 /// A scene file.
 #[derive(Default)]
 pub(super) struct Document {
-    pub(super) meshes: Vec<MeshEntry>,
+    pub(super) objects: Vec<ObjectEntry>,
     pub(super) camera: Option<Track<CameraPose>>,
     pub(super) lights: Option<Vec<Light>>,
     pub(super) materials: Vec<MaterialEntry>,
-}
-
-/// An instance of a mesh.
-pub(super) struct MeshEntry {
-    pub(super) file: Spanned,
-    pub(super) name: Option<String>,
-    pub(super) pose: Track<Pose>,
 }
 
 /// Changes to the materials of a name.
@@ -42,9 +36,6 @@ pub(super) struct MaterialEntry {
 }
 
 const SCENE: Shape = Shape { what: "a scene", required: &["meshes"], optional: &["camera", "lights", "materials"] };
-const MESH: Shape = Shape { what: "a mesh", required: &["file"], optional: &["name", "transform", "motion", "repeat"] };
-const TRANSFORM: Shape = Shape { what: "a transform", required: &[], optional: &["translate", "rotate_deg", "scale"] };
-const TRANSFORM_KEY: Shape = Shape { what: "a key frame of an object", required: &["time"], optional: TRANSFORM.optional };
 const CAMERA: Shape = Shape { what: "a camera", required: &["origin", "target"], optional: &["up", "fov_x_deg", "motion", "repeat"] };
 const CAMERA_KEY: Shape =
     Shape { what: "a key frame of a camera", required: &["time"], optional: &["origin", "target", "up", "fov_x_deg"] };
@@ -65,7 +56,7 @@ pub(super) fn read(reader: &mut Reader, tree: &Tree) -> Document {
         if list.is_empty() && matches!(tree.kind, Kind::List(_)) {
             reader.error(&tree.range, "a scene needs a mesh", "write `meshes: [\"mesh.obj\"]`");
         }
-        document.meshes = list.iter().filter_map(|tree| read_mesh(reader, tree)).collect();
+        document.objects = list.iter().filter_map(|tree| read_object(reader, tree)).collect();
     }
     document.camera = fields.get("camera").and_then(|tree| read_camera(reader, tree));
     document.lights =
@@ -90,50 +81,6 @@ pub(super) fn named(reader: &mut Reader, tree: &Tree, wanted: &[&'static str], h
         reader.error(&name.range, format!("expected {forms}, found `{}(…)`", name.text), known);
     }
     found.copied()
-}
-
-fn read_mesh(reader: &mut Reader, tree: &Tree) -> Option<MeshEntry> {
-    if let Kind::Text(_) = tree.kind {
-        return reader.text(tree, "a file").map(|file| MeshEntry { file, name: None, pose: Track::fixed(Pose::default()) });
-    }
-    named(reader, tree, &["Mesh"], "a mesh is \"mesh.obj\" or `Mesh(file: \"mesh.obj\", …)`")?;
-    let fields = reader.record(tree, &MESH)?;
-    let name = fields.get("name").and_then(|tree| reader.text(tree, "a name")).map(|name| name.text);
-    let mut rest = Pose::default();
-    if let Some(tree) = fields.get("transform") {
-        let before = reader.out.len();
-        rest = read_pose(reader, tree, &TRANSFORM, &rest).map_or(rest, |(pose, _)| pose);
-        if reader.out.len() == before && rest.scale.to_array().contains(&0.0) {
-            reader.error(&tree.range, "the scale is zero", "an object that stands still needs a size along every axis");
-        }
-    }
-    let motion = read_motion(reader, &fields, |reader, tree| read_pose(reader, tree, &TRANSFORM_KEY, &rest));
-    if let Some(keys) = &motion {
-        warn_long_turns(reader, keys);
-    }
-    let pose = motion.and_then(|keys| keys.track(|(pose, _)| pose)).unwrap_or_else(|| Track::fixed(rest));
-    let file = fields.get("file").and_then(|tree| reader.text(tree, "a file"))?;
-    Some(MeshEntry { file, name, pose })
-}
-
-/// A pose, and its rotation as axis and angle if it is written so.
-pub(super) type WrittenPose = (Pose, Option<(Vec3, f32)>);
-
-fn read_pose(reader: &mut Reader, tree: &Tree, shape: &Shape, rest: &Pose) -> Option<WrittenPose> {
-    let fields = reader.record(tree, shape)?;
-    let mut pose = *rest;
-    let mut turn = None;
-    if let Some(translate) = fields.get("translate").and_then(|tree| point(reader, tree)) {
-        pose.translate = translate;
-    }
-    if let Some((rotate, written)) = fields.get("rotate_deg").and_then(|tree| rotation(reader, tree)) {
-        pose.rotate = rotate;
-        turn = written;
-    }
-    if let Some(scale) = fields.get("scale").and_then(|tree| scale(reader, tree)) {
-        pose.scale = scale;
-    }
-    Some((pose, turn))
 }
 
 fn read_camera(reader: &mut Reader, tree: &Tree) -> Option<Track<CameraPose>> {

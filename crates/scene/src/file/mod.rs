@@ -3,9 +3,10 @@
 mod document;
 mod light;
 mod motion;
+mod object;
 mod values;
 
-use std::{path::Path, sync::Arc};
+use std::{collections::HashMap, path::Path, sync::Arc};
 
 use manylight_graph::{
     diagnostics::{Diagnostic, Diagnostics, Label, Source},
@@ -14,14 +15,16 @@ use manylight_graph::{
 
 use crate::{
     bounds::Bounds,
+    deform::{Deformation, Metaballs, Room},
     files::{FileReader, Files, beside, cannot_read, without_dots},
     fit,
-    import::{Material, Mesh, TextureSet, import_obj, nowhere},
+    import::{Material, Mesh, MeshTriangle, TextureSet, import_obj, nowhere},
     motion::{Pose, Track},
     scene::{Light, Scene, SceneObject},
-    state::extent,
+    state::{extent, reach},
 };
-use document::{Document, MaterialEntry, MeshEntry};
+use document::{Document, MaterialEntry};
+use object::{MetaballsEntry, ObjectEntry, ShapeEntry};
 
 /// Loads a scene file, or a mesh as a scene of its own.
 pub(crate) fn load(path: &Path, reader: &dyn FileReader) -> Result<Scene, Diagnostics> {
@@ -58,6 +61,23 @@ pub(crate) fn load(path: &Path, reader: &dyn FileReader) -> Result<Scene, Diagno
 /// What to write in an empty file.
 const EXAMPLE: &str = "the least scene is `Scene(meshes: [\"mesh.obj\"])`";
 
+/// A fault of a file at the place where it is named.
+fn at(fault: Diagnostic, file: &Spanned) -> Diagnostic {
+    Diagnostic { labels: vec![Label { span: file.span.clone(), message: String::new() }], ..fault }
+}
+
+/// Why two meshes cannot be key frames of one, if they cannot.
+fn difference(a: &Mesh, b: &Mesh) -> Option<String> {
+    let count = |what: &str, a: usize, b: usize| (a != b).then(|| format!("it has {b} {what}, not {a}"));
+    let corners = |mesh: &Mesh, triangle: usize| mesh.triangles[triangle].vertices;
+    count("vertices", a.vertices.len(), b.vertices.len()).or_else(|| count("triangles", a.triangles.len(), b.triangles.len())).or_else(
+        || {
+            let other = (0..a.triangles.len()).find(|triangle| corners(a, *triangle) != corners(b, *triangle))?;
+            Some(format!("triangle {} of it joins other vertices", other + 1))
+        },
+    )
+}
+
 /// What is loaded so far.
 struct Loader<'a> {
     files: Files<'a>,
@@ -92,19 +112,30 @@ impl Loader<'_> {
         self.out.0.append(&mut reader.out);
 
         let mut objects = Vec::new();
-        for entry in &document.meshes {
-            let MeshEntry { file, name, pose } = entry;
-            match self.mesh(&beside(path, &file.text)) {
+        // Metaballs may have a material of a mesh: meshes first.
+        let is_metaballs = |entry: &ObjectEntry| matches!(entry.shape, ShapeEntry::Metaballs(_));
+        let mut order: Vec<usize> = (0..document.objects.len()).collect();
+        order.sort_by_key(|index| is_metaballs(&document.objects[*index]));
+        for index in order {
+            let ObjectEntry { name, pose, shape } = &document.objects[index];
+            let (mesh, file) = match shape {
+                ShapeEntry::Mesh { file, keys: None } => {
+                    (self.mesh(&beside(path, &file.text)).map_err(|fault| at(fault, file)), &file.text)
+                }
+                ShapeEntry::Mesh { file, keys: Some(keys) } => (self.keyed_mesh(path, file, keys), &file.text),
+                ShapeEntry::Metaballs(entry) => (self.metaballs(entry), &entry.place.text),
+            };
+            match mesh {
                 Ok(mesh) => {
-                    let stem = Path::new(&file.text).file_stem().unwrap_or_default().to_string_lossy();
-                    objects.push((name.clone().unwrap_or_else(|| stem.into_owned()), mesh, pose.clone()));
+                    let stem = Path::new(file).file_stem().unwrap_or_default().to_string_lossy();
+                    objects.push((index, (name.clone().unwrap_or_else(|| stem.into_owned()), mesh, pose.clone())));
                 }
-                Err(fault) => {
-                    self.out.0.push(Diagnostic { labels: vec![Label { span: file.span.clone(), message: String::new() }], ..fault })
-                }
+                Err(fault) => self.out.0.push(fault),
             }
         }
-        if objects.len() == document.meshes.len() && !objects.is_empty() {
+        objects.sort_by_key(|(index, _)| *index);
+        let objects: Vec<_> = objects.into_iter().map(|(_, object)| object).collect();
+        if objects.len() == document.objects.len() && !objects.is_empty() {
             for entry in &document.materials {
                 self.override_material(path, entry);
             }
@@ -115,12 +146,76 @@ impl Loader<'_> {
     /// The index of the mesh of a file.
     fn mesh(&mut self, path: &Path) -> Result<usize, Diagnostic> {
         let name = path.display().to_string();
-        if let Some(known) = self.meshes.iter().position(|mesh| mesh.name == name) {
+        if let Some(known) = self.meshes.iter().position(|mesh| mesh.name == name && mesh.deformation.is_none()) {
             return Ok(known);
         }
         let mesh = import_obj(path, &mut self.files, &mut self.materials, &mut self.textures, &mut self.out)?;
+        Ok(self.add(mesh))
+    }
+
+    fn add(&mut self, mesh: Mesh) -> usize {
         self.meshes.push(mesh);
-        Ok(self.meshes.len() - 1)
+        self.meshes.len() - 1
+    }
+
+    /// The index of a mesh with the vertices of other files at some times. Materials, triangles and texture coordinates are those of `file`.
+    fn keyed_mesh(&mut self, path: &Path, file: &Spanned, keys: &Track<Spanned>) -> Result<usize, Diagnostic> {
+        let first = beside(path, &file.text);
+        let mesh = import_obj(&first, &mut self.files, &mut self.materials, &mut self.textures, &mut self.out);
+        let mesh = mesh.map_err(|fault| at(fault, file))?;
+        let mut shapes = HashMap::from([(first.clone(), mesh.vertices.clone())]);
+        for (_, key) in keys.keys() {
+            let other = beside(path, &key.text);
+            if shapes.contains_key(&other) {
+                continue;
+            }
+            // Only its vertices matter.
+            let shape = import_obj(&other, &mut self.files, &mut Vec::new(), &mut TextureSet::default(), &mut self.out);
+            let shape = shape.map_err(|fault| at(fault, key))?;
+            if let Some(difference) = difference(&mesh, &shape) {
+                let message = format!("`{}` cannot be a key frame of `{}`: {difference}", other.display(), first.display());
+                let help =
+                    "key frames have the same vertices and faces in the same order, and each face an area: export them from one mesh";
+                return Err(Diagnostic::error(message, key.span.clone()).and(file.span.clone(), "the mesh").help(help));
+            }
+            shapes.insert(other, shape.vertices);
+        }
+        let shapes = keys.clone().map(|key| shapes.get(&beside(path, &key.text)).cloned().unwrap_or_default());
+        Ok(self.deforming(mesh.name, mesh.triangles, Deformation::Keys(shapes)))
+    }
+
+    /// The index of the mesh of metaballs.
+    fn metaballs(&mut self, entry: &MetaballsEntry) -> Result<usize, Diagnostic> {
+        let MetaballsEntry { balls, level, cells, material, place } = entry;
+        let known = self.materials.iter().position(|known| known.name == *material);
+        let material = known.unwrap_or_else(|| {
+            self.materials.push(Material::grey(material));
+            self.materials.len() - 1
+        });
+        let metaballs = Metaballs::new(balls.clone(), *level, *cells, material as u32);
+        if metaballs.room() == Room::default() {
+            let message = "the metaballs have no surface";
+            let help = "lower `level`, or raise `radius`, `strength` or `cells`";
+            if !metaballs.moves() {
+                return Err(Diagnostic::error(message, place.span.clone()).help(help));
+            }
+            let message = format!("{message} at any of the times looked at");
+            self.out.0.push(Diagnostic::warning(message, place.span.clone()).help(help));
+        }
+        if !metaballs.moves() {
+            let (vertices, triangles) = metaballs.surface(0.0);
+            return Ok(self.add(Mesh::whole(place.text.clone(), vertices, triangles)));
+        }
+        Ok(self.deforming(place.text.clone(), Vec::new(), Deformation::Metaballs(metaballs)))
+    }
+
+    /// The index of a mesh that deforms, in its shape at time 0.
+    fn deforming(&mut self, name: String, triangles: Vec<MeshTriangle>, deformation: Deformation) -> usize {
+        let mut mesh = Mesh::whole(name, Vec::new(), Vec::new());
+        mesh.triangles = triangles;
+        mesh.deformation = Some(deformation);
+        let at_rest = mesh.at(0.0).unwrap_or_else(|| mesh.clone());
+        self.add(Mesh { deformation: mesh.deformation, ..at_rest })
     }
 
     /// Changes all materials of a name.
@@ -152,6 +247,10 @@ impl Loader<'_> {
         if self.out.has_errors() {
             return Err(self.out.sorted());
         }
+        let room = Room {
+            vertices: self.meshes.iter().map(|mesh| mesh.room().vertices).sum(),
+            triangles: objects.iter().map(|(_, mesh, _)| self.meshes[*mesh].room().triangles).sum(),
+        };
         let objects: Vec<SceneObject> = objects
             .into_iter()
             .map(|(name, mesh, pose)| {
@@ -159,7 +258,10 @@ impl Loader<'_> {
                 SceneObject { name, mesh, pose, at_rest }
             })
             .collect();
-        let bounds = objects.iter().fold(Bounds::EMPTY, |bounds, object| bounds.union(object.at_rest.bounds));
+        let mut bounds = objects.iter().fold(Bounds::EMPTY, |bounds, object| bounds.union(object.at_rest.bounds));
+        if bounds.is_empty() {
+            bounds = reach(&self.meshes, &objects, 0.0);
+        }
         let camera = document.camera.unwrap_or_else(|| {
             let camera = fit::camera(&bounds);
             let message = format!("the scene has no camera: it is seen from {} towards {}", camera.origin, camera.target);
@@ -185,6 +287,18 @@ impl Loader<'_> {
         }
         let Self { files, meshes, materials, textures, out } = self;
         let Files { seen: sources, hash, .. } = files;
-        Ok(Scene { name, meshes, objects, materials, textures: textures.build(), lights, camera, warnings: out.sorted(), sources, hash })
+        Ok(Scene {
+            name,
+            meshes,
+            objects,
+            materials,
+            textures: textures.build(),
+            lights,
+            camera,
+            room,
+            warnings: out.sorted(),
+            sources,
+            hash,
+        })
     }
 }

@@ -7,8 +7,8 @@ use manylight_graph::{
     ron::{Fields, Kind, Reader, Tree, head, suggest},
 };
 
-use super::{document::WrittenPose, values::LARGEST};
-use crate::motion::{Interpolate, LightPose, Repeat, Track};
+use super::{object::WrittenPose, values::LARGEST};
+use crate::motion::{LightPose, Repeat, Track};
 
 /// Key frames as written.
 pub(super) struct Keys<T> {
@@ -18,8 +18,18 @@ pub(super) struct Keys<T> {
 }
 
 impl<T> Keys<T> {
+    /// The same keys with other values.
+    pub(super) fn map<U>(&self, convert: impl Fn(&T) -> U) -> Keys<U> {
+        Keys { keys: self.keys.iter().map(|(time, value, place)| (*time, convert(value), place.clone())).collect(), repeat: self.repeat }
+    }
+
+    /// The values.
+    pub(super) fn values(&self) -> impl Iterator<Item = &T> {
+        self.keys.iter().map(|(_, value, _)| value)
+    }
+
     /// The track; `None` if there is no key.
-    pub(super) fn track<U: Interpolate>(self, convert: impl Fn(T) -> U) -> Option<Track<U>> {
+    pub(super) fn track<U>(self, convert: impl Fn(T) -> U) -> Option<Track<U>> {
         Track::keyed(self.keys.into_iter().map(|(time, value, _)| (time, convert(value))).collect(), self.repeat)
     }
 }

@@ -4,7 +4,11 @@ use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
 
-use crate::{bounds::Bounds, gpu_data::Vertex};
+use crate::{
+    bounds::Bounds,
+    deform::{Deformation, Room, mixed},
+    gpu_data::Vertex,
+};
 
 /// A triangle of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,17 +19,19 @@ pub struct MeshTriangle {
     pub material: u32,
 }
 
-/// Triangles in a space of their own. Every triangle has an area, and no two are equal.
+/// Triangles in a space of their own. In a mesh from a file every triangle has an area, and no two are equal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     /// Its file, as named in the scene.
     pub name: String,
-    /// Vertices; all finite where a triangle uses them.
+    /// Vertices; all finite where a triangle uses them. Of a mesh that deforms: at time 0.
     pub vertices: Vec<Vertex>,
-    /// At least one.
+    /// At least one, but for metaballs without a surface. Of a mesh that deforms: at time 0.
     pub triangles: Vec<MeshTriangle>,
     /// Sizes of all that.
     pub statistics: MeshStatistics,
+    /// How it changes over time, if it does.
+    pub deformation: Option<Deformation>,
 }
 
 /// Sizes in object space.
@@ -43,6 +49,23 @@ pub struct MeshStatistics {
     pub edge_min: f64,
     /// Longest edge.
     pub edge_max: f64,
+}
+
+impl MeshStatistics {
+    /// Of no triangles: least sizes are infinite.
+    const NONE: Self =
+        Self { bounds: Bounds::EMPTY, area: 0.0, area_min: f64::INFINITY, area_max: 0.0, edge_min: f64::INFINITY, edge_max: 0.0 };
+
+    /// Counts a triangle.
+    fn add(&mut self, corners: &[DVec3; 3]) {
+        let (area, edges) = (area(corners), edges(corners));
+        self.area += area;
+        self.area_min = self.area_min.min(area);
+        self.area_max = self.area_max.max(area);
+        self.edge_min = edges.into_iter().fold(self.edge_min, f64::min);
+        self.edge_max = edges.into_iter().fold(self.edge_max, f64::max);
+        corners.iter().for_each(|corner| self.bounds.add(*corner));
+    }
 }
 
 /// Triangles that were left out.
@@ -65,22 +88,14 @@ impl Mesh {
         let mut left_out = LeftOut::default();
         let place = places(&vertices);
         let mut known = HashSet::with_capacity(triangles.len());
-        let mut statistics = MeshStatistics {
-            bounds: Bounds::EMPTY,
-            area: 0.0,
-            area_min: f64::INFINITY,
-            area_max: 0.0,
-            edge_min: f64::INFINITY,
-            edge_max: 0.0,
-        };
+        let mut statistics = MeshStatistics::NONE;
         triangles.retain(|triangle| {
             let corners = triangle.vertices.map(|i| vertices[i as usize].position.as_dvec3());
             if !corners.iter().all(|corner| corner.is_finite()) {
                 left_out.not_finite += 1;
                 return false;
             }
-            let edges = edges(&corners);
-            let longest = edges.into_iter().fold(0.0, f64::max);
+            let longest = edges(&corners).into_iter().fold(0.0, f64::max);
             let area = area(&corners);
             if area <= f64::from(f32::MIN_POSITIVE) || area <= SMALLEST_AREA * longest * longest {
                 left_out.flat += 1;
@@ -92,16 +107,42 @@ impl Mesh {
                 left_out.repeated += 1;
                 return false;
             }
-            statistics.area += area;
-            statistics.area_min = statistics.area_min.min(area);
-            statistics.area_max = statistics.area_max.max(area);
-            statistics.edge_min = edges.into_iter().fold(statistics.edge_min, f64::min);
-            statistics.edge_max = statistics.edge_max.max(longest);
-            corners.into_iter().for_each(|corner| statistics.bounds.add(corner));
+            statistics.add(&corners);
             true
         });
-        let mesh = (!triangles.is_empty()).then_some(Self { name, vertices, triangles, statistics });
+        let mesh = (!triangles.is_empty()).then_some(Self { name, vertices, triangles, statistics, deformation: None });
         (mesh, left_out)
+    }
+
+    /// A mesh of all these triangles.
+    pub(crate) fn whole(name: String, vertices: Vec<Vertex>, triangles: Vec<MeshTriangle>) -> Self {
+        let mut mesh = Self { name, vertices, triangles, statistics: MeshStatistics::NONE, deformation: None };
+        let mut statistics = MeshStatistics::NONE;
+        mesh.triangles.iter().for_each(|triangle| statistics.add(&mesh.corners(triangle)));
+        mesh.statistics = statistics;
+        mesh
+    }
+
+    /// Its shape at a time in seconds, as a mesh that does not deform; `None` if it is one itself.
+    pub fn at(&self, time: f64) -> Option<Self> {
+        let (vertices, triangles) = match self.deformation.as_ref()? {
+            Deformation::Keys(shapes) => (mixed(shapes, time), self.triangles.clone()),
+            Deformation::Metaballs(metaballs) => metaballs.surface(time),
+        };
+        Some(Self::whole(self.name.clone(), vertices, triangles))
+    }
+
+    /// What buffers need for it at all times, as far as is known.
+    pub(crate) fn room(&self) -> Room {
+        match &self.deformation {
+            Some(Deformation::Metaballs(metaballs)) => metaballs.room(),
+            _ => Room { vertices: self.vertices.len(), triangles: self.triangles.len() },
+        }
+    }
+
+    /// A box around its shapes at all times, object space.
+    pub(crate) fn reach(&self) -> Bounds {
+        self.deformation.as_ref().map_or(self.statistics.bounds, Deformation::reach)
     }
 
     /// The corners of a triangle in object space.

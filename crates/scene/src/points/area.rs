@@ -1,19 +1,18 @@
 //! A given number of points, in proportion to area.
 
-use super::{MAX_POINTS, PointError, for_each_surface};
+use super::{MAX_POINTS, PointError, Shapes};
 use crate::{
     gpu_data::ScenePoint,
     random::{hash2, unit},
-    scene::Scene,
 };
 
 /// Systematic sampling of the cumulative area: point i lies at a random place of the i-th of `count` equal pieces.
-pub(super) fn generate(scene: &Scene, count: u32, seed: u32) -> Result<Vec<ScenePoint>, PointError> {
+pub(super) fn generate(shapes: &Shapes<'_>, count: u32, seed: u32) -> Result<Vec<ScenePoint>, PointError> {
     if u64::from(count) > MAX_POINTS {
         return Err(PointError::TooMany { wanted: count.into(), lower: "the number of points" });
     }
     let mut total = 0.0;
-    for_each_surface(scene, |_, _, area| total += area);
+    shapes.for_each_surface(|_, _, area| total += area);
     if count == 0 || total <= 0.0 {
         return Ok(Vec::new());
     }
@@ -23,7 +22,7 @@ pub(super) fn generate(scene: &Scene, count: u32, seed: u32) -> Result<Vec<Scene
     let mut before = 0.0;
     let mut next = 0;
     let mut last = None;
-    for_each_surface(scene, |_, surface, area| {
+    shapes.for_each_surface(|_, surface, area| {
         let after = before + area;
         while next < count && place(next) < after && area > 0.0 {
             points.push(surface.point((place(next) - before) / area, share));

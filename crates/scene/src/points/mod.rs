@@ -1,4 +1,4 @@
-//! Points on the surfaces for imperfect shadow maps, made on the host when a scene is loaded.
+//! Points on the surfaces for imperfect shadow maps, made on the host when a scene is loaded or deforms.
 //!
 //! Both methods put points along one line: the triangles in the order of the scene, and inside each triangle a hierarchical order of
 //! sub-triangles ([`on_triangle`]), so that a short piece of the line is a small patch of surface. Each point has its own piece of the line
@@ -14,6 +14,7 @@ mod tessellation;
 use glam::DVec3;
 
 use crate::{
+    deform::Deformed,
     gpu_data::ScenePoint,
     import::{Mesh, MeshTriangle},
     random::{hash2, shuffle},
@@ -77,16 +78,18 @@ pub enum PointError {
     },
 }
 
-/// Makes the points of a scene: the same for the same scene and options on every machine.
+/// Makes the points of a scene whose meshes have the shapes of `deformed`, the others their own: the same for the same scene, shapes and
+/// options on every machine.
 ///
 /// Triangles of objects that have no size at time 0 get no points from [`PointMethod::Area`].
 ///
 /// # Errors
 /// The options ask for more than [`MAX_POINTS`], or are out of range.
-pub fn generate(scene: &Scene, options: &PointOptions) -> Result<Vec<ScenePoint>, PointError> {
+pub fn generate(scene: &Scene, deformed: &[Deformed], options: &PointOptions) -> Result<Vec<ScenePoint>, PointError> {
+    let shapes = Shapes { scene, deformed };
     let mut points = match options.method {
-        PointMethod::Tessellation { min, max, smoothness } => tessellation::generate(scene, min, max, smoothness, options.seed)?,
-        PointMethod::Area { count } => area::generate(scene, count, options.seed)?,
+        PointMethod::Tessellation { min, max, smoothness } => tessellation::generate(&shapes, min, max, smoothness, options.seed)?,
+        PointMethod::Area { count } => area::generate(&shapes, count, options.seed)?,
     };
     let block = (points.len() / LEAST_BLOCKS).clamp(SMALLEST_BLOCK, LARGEST_BLOCK);
     for (index, block) in points.chunks_mut(block).enumerate() {
@@ -128,15 +131,29 @@ impl Surface {
     }
 }
 
-/// Calls back for every triangle of every object with its index among all.
-fn for_each_surface(scene: &Scene, mut visit: impl FnMut(u32, &Surface, f64)) {
-    let mut index = 0;
-    for (number, object) in scene.objects.iter().enumerate() {
-        let (mesh, matrix) = (&scene.meshes[object.mesh], world_from_object(object));
-        for triangle in &mesh.triangles {
-            let (surface, area) = Surface::new(number, mesh, triangle, &matrix);
-            visit(index, &surface, area);
-            index += 1;
+/// What gets points.
+struct Shapes<'a> {
+    scene: &'a Scene,
+    deformed: &'a [Deformed],
+}
+
+impl<'a> Shapes<'a> {
+    /// The objects with their meshes.
+    fn objects(&self) -> impl Iterator<Item = (&'a SceneObject, &'a Mesh)> {
+        let Self { scene, deformed } = *self;
+        scene.objects.iter().map(move |object| (object, scene.shape(object.mesh, deformed)))
+    }
+
+    /// Calls back for every triangle of every object with its index among all.
+    fn for_each_surface(&self, mut visit: impl FnMut(u32, &Surface, f64)) {
+        let mut index = 0;
+        for (number, (object, mesh)) in self.objects().enumerate() {
+            let matrix = world_from_object(object);
+            for triangle in &mesh.triangles {
+                let (surface, area) = Surface::new(number, mesh, triangle, &matrix);
+                visit(index, &surface, area);
+                index += 1;
+            }
         }
     }
 }

@@ -2,12 +2,11 @@
 
 use std::collections::HashMap;
 
-use super::{MAX_POINTS, PointError, for_each_surface};
+use super::{MAX_POINTS, PointError, Shapes};
 use crate::{
     gpu_data::ScenePoint,
     import::edges,
     random::{hash2, unit},
-    scene::Scene,
 };
 
 /// Order of the polynomial that blends between the factors of the smallest and of the largest triangle.
@@ -33,11 +32,11 @@ impl Smoothness {
 }
 
 /// Points with factors from `min` to `max`.
-pub(super) fn generate(scene: &Scene, min: u32, max: u32, smoothness: Smoothness, seed: u32) -> Result<Vec<ScenePoint>, PointError> {
+pub(super) fn generate(shapes: &Shapes<'_>, min: u32, max: u32, smoothness: Smoothness, seed: u32) -> Result<Vec<ScenePoint>, PointError> {
     if min == 0 || min > max {
         return Err(PointError::Factors { min, max });
     }
-    let statistics = || scene.objects.iter().map(|object| &scene.meshes[object.mesh].statistics);
+    let statistics = || shapes.objects().map(|(_, mesh)| &mesh.statistics);
     let area_min = statistics().map(|s| s.area_min).fold(f64::INFINITY, f64::min);
     let area_max = statistics().map(|s| s.area_max).fold(0.0, f64::max);
     let edge_min = statistics().map(|s| s.edge_min).fold(f64::INFINITY, f64::min);
@@ -45,10 +44,9 @@ pub(super) fn generate(scene: &Scene, min: u32, max: u32, smoothness: Smoothness
     let factor = |lower, upper, value| ((smoothness.step(lower, upper, value) * f64::from(max)).ceil() as u32).max(min);
 
     let mut known = HashMap::new();
-    let mut counts = Vec::with_capacity(scene.triangle_count());
+    let mut counts = Vec::new();
     let mut wanted = 0;
-    for object in &scene.objects {
-        let mesh = &scene.meshes[object.mesh];
+    for (_, mesh) in shapes.objects() {
         for triangle in &mesh.triangles {
             let corners = mesh.corners(triangle);
             let inner = factor(area_min, area_max, crate::import::area(&corners)); // [ACRSM] eq. 5.3
@@ -64,7 +62,7 @@ pub(super) fn generate(scene: &Scene, min: u32, max: u32, smoothness: Smoothness
     }
 
     let mut points = Vec::with_capacity(wanted as usize);
-    for_each_surface(scene, |index, surface, area| {
+    shapes.for_each_surface(|index, surface, area| {
         let count = counts[index as usize];
         let share = area / f64::from(count);
         points.extend((0..count).map(|i| {
