@@ -4,6 +4,7 @@
 mod blocks;
 mod cli;
 mod clustering;
+mod deforming;
 mod determinism;
 mod light_kinds;
 mod lights;
