@@ -61,15 +61,10 @@ pub fn reference_rgb(picture: &Picture, x: u32, y: u32) -> [f64; 3] {
 
 /// Mean absolute error over the mean, and the energy ratio.
 pub fn error(image: &Image, reference: &Picture) -> (f64, f64) {
-    error_against(image, |x, y| reference_rgb(reference, x, y))
-}
-
-/// The same against any picture.
-pub fn error_against(image: &Image, reference: impl Fn(u32, u32) -> [f64; 3]) -> (f64, f64) {
     let pixels = || (0..image.height).flat_map(|y| (0..image.width).map(move |x| (x, y)));
     let values = |f: fn([f64; 3], [f64; 3], usize) -> f64| {
         mean(pixels().flat_map(|(x, y)| {
-            let (a, b) = (rgb(image, x, y), reference(x, y));
+            let (a, b) = (rgb(image, x, y), reference_rgb(reference, x, y));
             (0..3).map(move |i| f(a, b, i))
         }))
     };
