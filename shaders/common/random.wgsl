@@ -40,6 +40,11 @@ fn halton_23(index: u32) -> vec2f {
     return vec2f(radical_inverse_2(index), radical_inverse_3(index));
 }
 
+// Point `index` of the sequence R2 (Roberts 2018), in [0, 1)²: multiples of one over the plastic number and of its square, exact to 24 bits. No loop.
+fn r2_point(index: u32) -> vec2f {
+    return vec2f(unit_float(index * 3242174889u), unit_float(index * 2447445414u));
+}
+
 // Owen's scrambling in a hash: each bit is flipped or not, depending on the bits above it. [BURLEY], after Laine and Karras.
 fn owen_scramble(bits: u32, seed: u32) -> u32 {
     var x = reverseBits(bits) + seed;

@@ -123,18 +123,34 @@ fn texel_area(texel: vec2u, size: vec2u, distance: f32, cosine: f32) -> f32 {
     return extent_at(place) * spread * spread / max(cosine, MIN_COSINE);
 }
 
-// Where a view sees a world position: texels of the whole map in xy (outside of its cell: not seen), distance along its axis in z (≤ 0: behind it).
-fn position_in_map(index: u32, position: vec3f, size: vec2u) -> vec3f {
+// Where a view sees a world position: (0, 0) is the top left corner of its cell, (1, 1) the bottom right; distance along its axis in z (≤ 0: behind it).
+fn position_in_cell(index: u32, position: vec3f) -> vec3f {
     let view = scene_light_views[index].view;
-    var seen: vec3f;
     if is_parallel(index) {
         let v = position - view.origin;
-        seen = vec3f(0.5 + 0.5 * dot(v, view.right) / view.tan_half_x, 0.5 - 0.5 * dot(v, view.up) / view.tan_half_y, dot(v, view.forward));
-    } else {
-        seen = view_uv(view, position);
+        return vec3f(0.5 + 0.5 * dot(v, view.right) / view.tan_half_x, 0.5 - 0.5 * dot(v, view.up) / view.tan_half_y, dot(v, view.forward));
     }
+    return view_uv(view, position);
+}
+
+// The same in texels of the whole map.
+fn position_in_map(index: u32, position: vec3f, size: vec2u) -> vec3f {
+    let seen = position_in_cell(index, position);
     let side = cell_side(size);
     return vec3f(seen.xy * f32(side) + vec2f(cell_of_view(index) * side), seen.z);
+}
+
+// The place of a view's cell that is nearest to where it sees a position, in [0, 1]². Positions behind a light are beyond the border that is nearest to them.
+fn place_towards(index: u32, position: vec3f) -> vec2f {
+    let seen = position_in_cell(index, position);
+    let v = position - scene_light_views[index].view.origin;
+    let least = 1e-3 * length(v);
+    if is_parallel(index) || seen.z > least {
+        return saturate(seen.xy);
+    }
+    let view = scene_light_views[index].view;
+    let side = vec2f(dot(v, view.right), -dot(v, view.up)) / max(least, 1e-30);
+    return saturate(0.5 + 0.5 * side / vec2f(view.tan_half_x, view.tan_half_y));
 }
 
 // Distance of a world position from its light as the map holds distances.

@@ -6,6 +6,7 @@ mod cli;
 mod clustering;
 mod deforming;
 mod determinism;
+mod gather;
 mod light_kinds;
 mod lights;
 mod metrics;
