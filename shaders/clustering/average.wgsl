@@ -1,6 +1,7 @@
 // One k-means update. [ACRSM] 4.7, 5.3.1, [VAL] 4.
 // A group per cluster gathers its texels from their rectangle in a fixed order, so the sums have the same bits every time (additive
 // blending, as in the paper, has not). Means of normals may cancel: then the old normal stays and the frames are counted.
+// With `stay` only the sums are made, as [IIR] gives virtual lights their intensity.
 // What bounds it: reads of the map, the area of all rectangles together.
 
 #import common::rsm::{texel_ray, texel_position, texel_area, Cell, cell_of_texel, in_cell}
@@ -20,6 +21,7 @@
 override flux_is_sum: bool;
 override area_is_circle: bool;
 override snap: bool;
+override stay: bool;
 
 const LANES: u32 = 128u;
 // Below this length the sum of a cluster's unit normals, over their number, has no direction worth the name.
@@ -133,8 +135,8 @@ fn average(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     let columns = max(extent.x, 1u);
     let centre = low + vec2u(nearest_texel[0] % columns, nearest_texel[0] / columns);
 
-    var centre_position = mean_position;
-    if snap && whole.count > 0u {
+    var centre_position = select(mean_position, cluster.position, stay);
+    if snap && !stay && whole.count > 0u {
         centre_position = position_of(centre);
     }
     var radius_2 = 0.0;
@@ -164,14 +166,16 @@ fn average(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     for (var i = 1u; i < LANES; i++) {
         radius_2 = max(radius_2, farthest[i]);
     }
-    cluster.position = centre_position;
-    cluster.texel = select(mean_texel, vec2f(centre) + 0.5, snap);
-    let normal = whole.normal / n;
-    if dot(normal, normal) > CANCELLED * CANCELLED {
-        cluster.normal = normalize(normal);
-        cluster.cancelled = 0u;
-    } else {
-        cluster.cancelled += 1u;
+    if !stay {
+        cluster.position = centre_position;
+        cluster.texel = select(mean_texel, vec2f(centre) + 0.5, snap);
+        let normal = whole.normal / n;
+        if dot(normal, normal) > CANCELLED * CANCELLED {
+            cluster.normal = normalize(normal);
+            cluster.cancelled = 0u;
+        } else {
+            cluster.cancelled += 1u;
+        }
     }
     cluster.importance = whole.importance / n;
     cluster.area = select(whole.area, PI * radius_2, area_is_circle);

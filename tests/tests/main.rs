@@ -7,6 +7,7 @@ mod clustering;
 mod deforming;
 mod determinism;
 mod gather;
+mod incremental;
 mod light_kinds;
 mod lights;
 mod metrics;
