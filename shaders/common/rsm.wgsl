@@ -117,10 +117,13 @@ fn power_of_unit_strength_at(light: Light, place: Place) -> f32 {
 const MIN_COSINE: f32 = 0.02;
 
 // Surface that a texel stands for, m²: `cosine` at the surface, towards the light.
-fn texel_area(texel: vec2u, size: vec2u, distance: f32, cosine: f32) -> f32 {
-    let place = place_of_texel(texel, size);
+fn area_at(place: Place, distance: f32, cosine: f32) -> f32 {
     let spread = select(distance, 1.0, is_parallel(place.view));
     return extent_at(place) * spread * spread / max(cosine, MIN_COSINE);
+}
+
+fn texel_area(texel: vec2u, size: vec2u, distance: f32, cosine: f32) -> f32 {
+    return area_at(place_of_texel(texel, size), distance, cosine);
 }
 
 // Where a view sees a world position: (0, 0) is the top left corner of its cell, (1, 1) the bottom right; distance along its axis in z (≤ 0: behind it).

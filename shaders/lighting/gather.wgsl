@@ -10,7 +10,7 @@
 
 #import common::scene::View
 #import common::view::pixel_direction
-#import common::rsm::{scene_light_views, view_count, cell_of_view, cell_side, place_towards, texel_ray, texel_area}
+#import common::rsm::{scene_light_views, view_count, cell_of_view, cell_side, place_towards, Place, ray_at, area_at}
 #import common::octahedral::unpack_unit
 #import common::random::{hash, unit_float, r2_point}
 #import common::radiometry::{PI, disk_form_factor, max_component}
@@ -51,19 +51,20 @@ fn polar_sample(i: u32, count: u32, turn: vec2f) -> Sample {
     return Sample(params.radius * xi * vec2f(cos(angle), sin(angle)), disk * select(2.0 * xi, 3.0 * xi * xi, weights_is_paper));
 }
 
-// Irradiance by the surface that a texel of the map saw, as a disk of the area of `texels` like it.
-fn irradiance_by(texel: vec2u, size: vec2u, texels: f32, position: vec3f, normal: vec3f) -> vec3f {
+// Irradiance by the surface that a texel of a view saw, as a disk of the area of `texels` like it.
+fn irradiance_by(place: Place, texels: f32, position: vec3f, normal: vec3f) -> vec3f {
+    let texel = cell_of_view(place.view) * place.side + place.pixel;
     let flux = textureLoad(rsm_flux, texel, 0).rgb;
     if max_component(flux) <= 0.0 {
         return vec3f(0.0);
     }
-    let ray = texel_ray(texel, size);
+    let ray = ray_at(place);
     let d = textureLoad(rsm_distance, texel, 0).x;
     let lit_normal = unpack_unit(textureLoad(rsm_normal, texel, 0).x);
     let v = position - (ray.origin + ray.direction * d);
     let d2 = dot(v, v);
     let direction = v * inverseSqrt(max(d2, 1e-30));
-    let area = texel_area(texel, size, d, -dot(lit_normal, ray.direction)) * texels;
+    let area = area_at(place, d, -dot(lit_normal, ray.direction)) * texels;
     return flux * texels * disk_form_factor(-dot(normal, direction), dot(lit_normal, direction), d2, area);
 }
 
@@ -89,8 +90,8 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
     for (var view = 0u; view < view_count(); view++) {
         total_weight += scene_light_views[view].weight;
     }
-    let size = textureDimensions(rsm_flux);
-    let side = f32(cell_side(size));
+    let side = cell_side(textureDimensions(rsm_flux));
+    let texels = f32(side * side);
     var irradiance = vec3f(0.0);
     for (var view = 0u; view < view_count(); view++) {
         let share = scene_light_views[view].weight / max(total_weight, 1e-30);
@@ -98,7 +99,6 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
             continue;
         }
         let count = max(u32(f32(params.samples) * share + 0.5), 1u);
-        let corner = vec2f(cell_of_view(view)) * side;
         let centre = place_towards(view, position);
         for (var i = 0u; i < count; i++) {
             var chosen: Sample;
@@ -111,8 +111,9 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
                 place = centre + chosen.offset;
             }
             if all(place >= vec2f(0.0)) && all(place < vec2f(1.0)) {
-                let texel = vec2u(corner + min(place * side, vec2f(side - 0.5)));
-                irradiance += irradiance_by(texel, size, chosen.share * side * side, position, normal);
+                // The product may round up to the next texel.
+                let pixel = min(vec2u(place * f32(side)), vec2u(side - 1u));
+                irradiance += irradiance_by(Place(view, side, pixel), chosen.share * texels, position, normal);
             }
         }
     }
