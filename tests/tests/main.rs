@@ -10,6 +10,7 @@ mod gather;
 mod incremental;
 mod light_kinds;
 mod lights;
+mod matrix;
 mod metrics;
 mod moving_light;
 mod path_tracer;

@@ -1,0 +1,543 @@
+//! Every pipeline under every combination of its options: each is planned, or refused with a reason; and of what is planned so many are
+//! rendered that every two options meet, and every number of every resource is looked at. Nothing here names a pipeline or an option.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use manylight_gpu::{ReadError, Subresource};
+use manylight_graph::{
+    condition::{Condition, ConditionKind},
+    library::Library,
+    pipeline::ArgumentValue,
+    plan::{Plan, Target},
+    registry::Direction,
+    value::{Format, ParamKind, ResourceDesc, Value},
+};
+use manylight_passes::{Documents, Renderer, SceneSource, Settings, load_registry, plan_input};
+use manylight_scene::Scene;
+
+use crate::{renders::gpu, support::root};
+
+const SIZE: (u32, u32) = (24, 16);
+const FRAMES: u32 = 2;
+/// Seconds from frame to frame: what moves has moved.
+const STEP: f64 = 0.5;
+/// Whole numbers above this (sizes, counts) are set to it, or to the least that they may be.
+const SMALL: i64 = 32;
+/// Of larger products, so many combinations are planned, chosen evenly.
+const MOST_PLANNED: usize = 100_000;
+/// So many where another pipeline of the same stages has all of them: only the numbers differ.
+const MOST_AGAIN: usize = 1_000;
+/// Combinations that are looked at to find the next one to render.
+const CANDIDATES: usize = 40;
+/// Faults that are told of one pipeline.
+const MOST_TOLD: usize = 6;
+
+/// A parameter and the values that it takes.
+#[derive(Debug, Clone)]
+struct Factor {
+    name: String,
+    values: Vec<String>,
+}
+
+/// An index of a value by factor.
+type Row = Vec<usize>;
+
+/// A repeatable source of chance (splitmix64).
+struct Chance(u64);
+
+impl Chance {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) % end.max(1) as u64) as usize
+    }
+}
+
+/// A pipeline with the scenes that it is tried on.
+struct Subject<'a> {
+    documents: &'a Documents,
+    scenes: &'a [(SceneSource, Scene)],
+    /// Choices and switches that change what is computed.
+    options: Vec<Factor>,
+    /// Those that only choose what is shown.
+    views: Vec<Factor>,
+    /// Numbers, small ones first.
+    numbers: Vec<Factor>,
+}
+
+impl<'a> Subject<'a> {
+    fn new(documents: &'a Documents, scenes: &'a [(SceneSource, Scene)]) -> Self {
+        let pipeline = documents.pipeline();
+        let preset = |name: &str| pipeline.set.get(name).map(|preset| preset.value.to_string());
+        let (mut options, mut views, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
+        for (name, param) in &pipeline.params {
+            let factor = |values: Vec<String>| Factor { name: name.clone(), values };
+            match &param.kind {
+                ParamKind::Choice { options: all, .. } if only_shows(documents, name) => views.push(factor(all.clone())),
+                ParamKind::Choice { options: all, .. } => options.push(factor(all.clone())),
+                ParamKind::Bool { .. } if only_shows(documents, name) => views.push(factor(switch())),
+                ParamKind::Bool { .. } => options.push(factor(switch())),
+                ParamKind::Int { min, default, .. } => {
+                    let usual = preset(name).and_then(|value| value.parse().ok()).unwrap_or(*default);
+                    let small = usual.min(SMALL).max(*min);
+                    let mut values = vec![small.to_string(), min.to_string()];
+                    values.dedup();
+                    numbers.push(factor(values));
+                }
+                ParamKind::Float { .. } => {}
+            }
+        }
+        Self { documents, scenes, options, views, numbers }
+    }
+
+    /// Numbers as they are first listed.
+    fn small(&self) -> Vec<(String, String)> {
+        self.numbers.iter().map(|factor| (factor.name.clone(), factor.values[0].clone())).collect()
+    }
+
+    fn settings(&self, factors: &[Factor], row: &[usize]) -> Settings {
+        let mut set = self.small();
+        set.extend(factors.iter().zip(row).map(|(factor, &value)| (factor.name.clone(), factor.values[value].clone())));
+        Settings { size: SIZE, set, ..Settings::default() }
+    }
+
+    /// The plan; nothing where it is refused with a reason; else the faults.
+    fn plan(&self, settings: &Settings, scene: &Scene) -> Result<Option<Plan>, String> {
+        let input = plan_input(settings, scene);
+        let faults = match self.documents.plan(&input) {
+            Ok(plan) => return Ok(Some(plan)),
+            Err(faults) => faults,
+        };
+        let refusals = self.documents.refusals(&input);
+        let reasons = self.documents.pipeline().refuse.iter().all(|refusal| !refusal.because.trim().is_empty());
+        if refusals == faults && reasons { Ok(None) } else { Err(format!("{}: {}", words(settings), faults.render())) }
+    }
+
+    /// Plans the product of all options on all scenes, or `most` of it; returns the rows that all scenes accept, and how many were refused.
+    fn plan_all(&self, most: usize, chance: &mut Chance, faults: &mut Vec<String>) -> (Vec<Row>, usize) {
+        let product = self.options.iter().try_fold(1_usize, |n, factor| n.checked_mul(factor.values.len()));
+        let row = |mut index: usize| -> Row {
+            let digit = |factor: &Factor| {
+                let value = index % factor.values.len();
+                index /= factor.values.len();
+                value
+            };
+            self.options.iter().map(digit).collect()
+        };
+        let rows: Vec<Row> = match product {
+            Some(all) if all <= most => (0..all).map(row).collect(),
+            _ => (0..most).map(|_| self.options.iter().map(|factor| chance.below(factor.values.len())).collect()).collect(),
+        };
+        // Every view of what the pipeline does by itself.
+        for view in &self.views {
+            for value in 0..view.values.len() {
+                let settings = self.settings(std::slice::from_ref(view), &[value]);
+                faults.extend(self.scenes.iter().filter_map(|(_, scene)| self.plan(&settings, scene).err()));
+            }
+        }
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let parts: Vec<(Vec<Row>, Vec<Row>, Vec<String>)> = std::thread::scope(|scope| {
+            let parts = rows.chunks(rows.len().div_ceil(threads).max(1)).map(|part| scope.spawn(|| self.plan_rows(part)));
+            parts.collect::<Vec<_>>().into_iter().map(|part| part.join().expect("no panic")).collect()
+        });
+        let (mut accepted, mut refused) = (Vec::new(), 0);
+        for (good, senseless, told) in parts {
+            accepted.extend(good);
+            refused += senseless.len();
+            faults.extend(told);
+        }
+        (accepted, refused)
+    }
+
+    /// The rows that all scenes accept, those that some scene refuses, and a fault for each that is neither, until there are enough.
+    fn plan_rows(&self, rows: &[Row]) -> (Vec<Row>, Vec<Row>, Vec<String>) {
+        let (mut accepted, mut refused, mut faults) = (Vec::new(), Vec::new(), Vec::new());
+        // Where no condition asks for the scene, all scenes have the same nodes.
+        let pipeline = self.documents.pipeline();
+        let conditions = pipeline.nodes.values().filter_map(|node| node.when.as_ref()).chain(pipeline.refuse.iter().map(|r| &r.when));
+        let asks = conditions.into_iter().any(|when| some_clause(when, &|clause| matches!(clause, ConditionKind::Feature(_))));
+        let scenes = if asks { self.scenes } else { &self.scenes[..1] };
+        for row in rows {
+            let settings = self.settings(&self.options, row);
+            let plans: Result<Vec<_>, String> = scenes.iter().map(|(_, scene)| self.plan(&settings, scene)).collect();
+            match plans {
+                Ok(plans) if plans.iter().all(Option::is_some) => accepted.push(row.clone()),
+                Ok(_) => refused.push(row.clone()),
+                Err(told) => faults.push(told),
+            }
+            if faults.len() >= MOST_TOLD {
+                break;
+            }
+        }
+        (accepted, refused, faults)
+    }
+
+    /// Rows over options and numbers in which every two values meet that meet in an accepted row. The first one is the pipeline as it is.
+    fn pairs(&self, accepted: &[Row], chance: &mut Chance) -> Vec<Row> {
+        let factors = self.factors();
+        let options = self.options.len();
+        let pairs_of = |row: &Row| -> BTreeSet<[(usize, usize); 2]> {
+            let each = |i: usize| (i + 1..row.len()).map(move |j| (i, j));
+            (0..row.len()).flat_map(each).map(|(i, j)| [(i, row[i]), (j, row[j])]).collect()
+        };
+        let mut open: BTreeSet<[(usize, usize); 2]> = BTreeSet::new();
+        // Which options meet, the accepted rows say; numbers meet everything.
+        for row in accepted {
+            open.extend(pairs_of(row));
+        }
+        for (i, factor) in factors.iter().enumerate().skip(options) {
+            for value in 0..factor.values.len() {
+                let others = factors.iter().enumerate().take(i).flat_map(|(j, other)| (0..other.values.len()).map(move |w| (j, w)));
+                let met = |&(j, w): &(usize, usize)| j >= options || accepted.iter().any(|row| row[j] == w);
+                open.extend(others.filter(met).map(|other| [other, (i, value)]));
+            }
+        }
+        let mut rows: Vec<Row> = Vec::new();
+        while let Some(&wanted) = open.first() {
+            let fits = |row: &&Row| wanted.iter().all(|&(i, value)| i >= options || row[i] == value);
+            let fitting: Vec<&Row> = accepted.iter().filter(fits).collect();
+            let candidate = |chance: &mut Chance| -> Row {
+                let mut row = fitting[chance.below(fitting.len())].clone();
+                row.extend(factors[options..].iter().map(|factor| chance.below(factor.values.len())));
+                wanted.iter().for_each(|&(i, value)| row[i] = value);
+                row
+            };
+            let found: Vec<Row> = (0..CANDIDATES).map(|_| candidate(chance)).collect();
+            let gain = |row: &Row| pairs_of(row).intersection(&open).count();
+            let best = found.into_iter().max_by_key(gain).expect("candidates");
+            for pair in pairs_of(&best) {
+                open.remove(&pair);
+            }
+            rows.push(best);
+        }
+        rows
+    }
+
+    fn factors(&self) -> Vec<Factor> {
+        self.options.iter().chain(&self.numbers).cloned().collect()
+    }
+
+    /// Renders a row on a scene and looks at everything; `None` where the numbers are refused.
+    fn render(&self, row: &Row, (source, scene): &(SceneSource, Scene)) -> Result<Option<()>, String> {
+        let mut settings = self.settings(&self.factors(), row);
+        let Some(plan) = self.plan(&settings, scene)? else { return Ok(None) };
+        settings.keep = written(&plan).into_iter().map(|(_, resource)| plan.resources[resource].name.clone()).collect();
+        let told = |what: String| format!("on {}, {}: {what}", scene.name, words(&settings));
+        let mut renderer = Renderer::with(gpu(), self.documents.clone(), source.clone(), scene.clone(), settings.clone())
+            .map_err(|e| told(e.to_string()))?;
+        for frame in 0..FRAMES {
+            renderer.render_frame(f64::from(frame) * STEP).map_err(|e| told(e.to_string()))?;
+            if let Some(bad) = scan(&renderer) {
+                return Err(told(format!("frame {frame}: {bad}")));
+            }
+        }
+        Ok(Some(()))
+    }
+}
+
+fn switch() -> Vec<String> {
+    ["false", "true"].map(str::to_owned).to_vec()
+}
+
+fn words(settings: &Settings) -> String {
+    settings.set.iter().map(|(name, value)| format!("--set {name}={value}")).collect::<Vec<_>>().join(" ")
+}
+
+/// Whether a parameter does nothing but turn on and off nodes that write what is presented.
+fn only_shows(documents: &Documents, name: &str) -> bool {
+    let pipeline = documents.pipeline();
+    let mut tested = false;
+    for node in pipeline.nodes.values() {
+        let Some(decl) = documents.registry().nodes.get(&node.node.text) else { return false };
+        let given = |argument: &ArgumentValue| matches!(argument, ArgumentValue::Param(param) if param == name);
+        if decl.params.contains_key(name) || node.params.values().any(|argument| given(&argument.value)) {
+            return false;
+        }
+        if node.when.as_ref().is_some_and(|when| tests(when, name)) {
+            tested = true;
+            let outputs = decl.ports.iter().filter(|(_, port)| port.direction == Direction::Output);
+            let resource = |port: &str| node.outputs.get(port).map_or(port.to_owned(), |connection| connection.resource.text.clone());
+            if outputs.into_iter().any(|(port, _)| resource(port) != pipeline.presents.text) {
+                return false;
+            }
+        }
+    }
+    tested
+}
+
+/// Whether a condition tests a parameter.
+fn tests(condition: &Condition, name: &str) -> bool {
+    some_clause(condition, &|clause| match clause {
+        ConditionKind::Is(param, _) | ConditionKind::IsOn(param) | ConditionKind::AtLeast(param, _) | ConditionKind::Below(param, _) => {
+            param.text == name
+        }
+        _ => false,
+    })
+}
+
+fn some_clause(condition: &Condition, is: &dyn Fn(&ConditionKind) -> bool) -> bool {
+    match &condition.kind {
+        ConditionKind::All(list) | ConditionKind::Any(list) => list.iter().any(|inner| some_clause(inner, is)),
+        ConditionKind::Not(inner) => some_clause(inner, is),
+        clause => is(clause),
+    }
+}
+
+/// Nodes and the resources that they write, in the order of execution.
+fn written(plan: &Plan) -> Vec<(usize, usize)> {
+    let outputs = |node: usize| {
+        let of = &plan.nodes[node];
+        let output = move |(port, target): &(String, Target)| match target {
+            Target::Resource(ix) if of.decl.ports.get(port).is_some_and(|p| p.direction == Direction::Output) => Some((node, *ix)),
+            _ => None,
+        };
+        of.bindings.iter().filter_map(output)
+    };
+    (0..plan.nodes.len()).flat_map(outputs).collect()
+}
+
+/// The first number, in the order of execution, that is none, is infinite, or is negative radiance.
+fn scan(renderer: &Renderer) -> Option<String> {
+    let plan = renderer.plan();
+    written(plan).into_iter().find_map(|(node, resource)| {
+        let resource = &plan.resources[resource];
+        let bad = match &resource.desc {
+            ResourceDesc::Texture { .. } => bad_texel(renderer, &resource.name, &resource.desc),
+            ResourceDesc::Buffer { element, .. } => bad_element(renderer, &resource.name, element),
+            ResourceDesc::Uniform { .. } => None,
+        }?;
+        let node = &plan.nodes[node];
+        Some(format!("node `{}` ({}) writes `{}`: {bad}", node.id, node.decl.name, resource.name))
+    })
+}
+
+/// Whether a resource holds radiance, which its documentation says.
+fn is_radiance(renderer: &Renderer, name: &str) -> bool {
+    let doc = renderer.pipeline().resources.get(name).map_or("", |resource| resource.doc.as_str());
+    doc.split(|c: char| !c.is_alphabetic()).any(|word| word == "radiance")
+}
+
+fn bad_texel(renderer: &Renderer, name: &str, desc: &ResourceDesc) -> Option<String> {
+    let ResourceDesc::Texture { format, mips, layers, .. } = desc else { return None };
+    if matches!(format, Format::R32Uint | Format::Rg32Uint | Format::Rgba32Uint) {
+        return None;
+    }
+    let radiance = is_radiance(renderer, name);
+    for layer in 0..*layers {
+        for mip in 0..*mips {
+            let part = Subresource { mip, layer };
+            let image = renderer.frame().read_image(renderer.gpu(), renderer.externals(), name, part).unwrap_or_else(|e| panic!("{e}"));
+            let channels = image.channels as usize;
+            // Alpha is something else.
+            let bad = |(i, v): &(usize, &f32)| !v.is_finite() || (radiance && i % channels < 3 && **v < 0.0);
+            if let Some((i, value)) = image.data.iter().enumerate().find(bad) {
+                let texel = i / channels;
+                let (x, y) = (texel % image.width as usize, texel / image.width as usize);
+                return Some(format!("texel ({x}, {y}) of level {mip}, layer {layer}, channel {} is {value}", i % channels));
+            }
+        }
+    }
+    None
+}
+
+fn bad_element(renderer: &Renderer, name: &str, element: &str) -> Option<String> {
+    match renderer.read_json(name) {
+        Ok(json) => json.as_array()?.iter().enumerate().find_map(|(i, value)| bad_number(value).map(|bad| format!("element {i}{bad}"))),
+        // A plain type has no fields: a structure's name is always known.
+        Err(ReadError::Layout { .. }) => {
+            let floats = element == "f32" || (element.starts_with("vec") && element.ends_with('f'));
+            let bytes = renderer.frame().read_bytes(renderer.gpu(), renderer.externals(), name).unwrap_or_else(|e| panic!("{e}"));
+            let mut numbers = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+            let at = numbers.position(|v| !v.is_finite()).filter(|_| floats)?;
+            Some(format!("number {at} is none or infinite"))
+        }
+        Err(e) => panic!("{e}"),
+    }
+}
+
+/// The place and the value of the first number that JSON lacks.
+fn bad_number(value: &serde_json::Value) -> Option<String> {
+    match value {
+        serde_json::Value::String(text) => Some(format!(" is {text}")),
+        serde_json::Value::Array(list) => list.iter().enumerate().find_map(|(i, v)| bad_number(v).map(|bad| format!("[{i}]{bad}"))),
+        serde_json::Value::Object(fields) => fields.iter().find_map(|(name, v)| bad_number(v).map(|bad| format!(".{name}{bad}"))),
+        _ => None,
+    }
+}
+
+/// The Cornell box, and a room without a spot light: a point light, a sun, and a block that turns.
+fn scenes(folder: &Path) -> Vec<(SceneSource, Scene)> {
+    let asset = |name: &str| root().join("assets").join(name).to_string_lossy().replace('\\', "/");
+    let text = format!(
+        r#"Scene(
+    meshes: [
+        "{}",
+        Mesh(file: "{}", name: "block", transform: (translate: (1.9, 0.01, 3.4), scale: (1.4, 2.8, 1.4)),
+             motion: [(time: 0.0, rotate_deg: (axis: (0.0, 1.0, 0.0), angle: 0.0)), (time: 2.0, rotate_deg: (axis: (0.0, 1.0, 0.0), angle: 90.0))]),
+    ],
+    camera: (origin: (2.78, 2.73, -8.0), target: (2.78, 2.73, 0.0), up: (0.0, 1.0, 0.0), fov_x_deg: 39.3),
+    lights: [Point(position: (2.78, 4.5, 2.8), intensity: (2.0, 3.0, 4.0)), Directional(direction: (0.3, -0.5, 1.0), irradiance: (3.0, 2.0, 1.0))],
+)"#,
+        asset("cornell_empty.obj"),
+        asset("cube.obj"),
+    );
+    let own = folder.join("point_and_sun.ron");
+    fs::write(&own, text).expect("writable");
+    let load = |path: PathBuf| {
+        let source = SceneSource::file(path);
+        let scene = source.load().unwrap_or_else(|faults| panic!("{}", faults.render()));
+        (source, scene)
+    };
+    vec![load(root().join("assets/cornell.ron")), load(own)]
+}
+
+/// The files that a pipeline is made of, where it adds nothing but values to them: then what they allow does not depend on the pipeline.
+fn stages(documents: &Documents) -> Option<Vec<String>> {
+    let pipeline = documents.pipeline();
+    let (own, stages) = pipeline.sources.split_first()?;
+    let params = pipeline.params.values().map(|param| &param.span);
+    let resources = pipeline.resources.values().map(|resource| &resource.span);
+    let nodes = pipeline.nodes.values().map(|node| &node.id.span);
+    let refuse = pipeline.refuse.iter().map(|refusal| &refusal.when.span);
+    let adds = params.chain(resources).chain(nodes).chain(refuse).any(|span| span.source.name == own.name);
+    (!adds).then(|| stages.iter().map(|source| source.name.clone()).collect())
+}
+
+/// Plans and renders a pipeline in all ways; returns a line for people, and the faults.
+fn try_all(subject: &Subject<'_>, most: usize, seed: u64) -> (String, Vec<String>) {
+    let (mut chance, mut faults, start) = (Chance(seed), Vec::new(), Instant::now());
+    let (accepted, refused) = subject.plan_all(most, &mut chance, &mut faults);
+    let planned = start.elapsed();
+    let rows = if faults.is_empty() { subject.pairs(&accepted, &mut chance) } else { Vec::new() };
+    let (mut rendered, mut without) = (0, 0);
+    for (row, scene) in rows.iter().flat_map(|row| subject.scenes.iter().map(move |scene| (row, scene))) {
+        match subject.render(row, scene) {
+            Ok(Some(())) => rendered += 1,
+            Ok(None) => without += 1,
+            Err(told) => faults.push(told),
+        }
+        if faults.len() >= MOST_TOLD {
+            break;
+        }
+    }
+    let rendering = start.elapsed() - planned;
+    let line = format!(
+        "{} planned in {:.1} s, {refused} refused, {rendered} of {} rendered in {:.1} s, {without} of them refused for their numbers",
+        accepted.len(),
+        planned.as_secs_f64(),
+        rows.len() * subject.scenes.len(),
+        rendering.as_secs_f64(),
+    );
+    (line, faults)
+}
+
+#[test]
+fn every_combination_of_options_renders_finite_numbers_or_is_refused_with_a_reason() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let scenes = scenes(folder.path());
+    let library = Library::new(Some(root()), Vec::new());
+    let (registry, found) = load_registry(&library);
+    let part = |path: &String| path["pipelines/".len()..].contains('/');
+    let mut all: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let mut seen = BTreeSet::new();
+    for path in library.list("pipelines", "ron").into_iter().filter(|path| !part(path)) {
+        let documents = Documents::with(library.clone(), registry.clone(), found.clone(), Path::new(&path));
+        let documents = documents.unwrap_or_else(|faults| panic!("{}", faults.render()));
+        let again = stages(&documents).is_some_and(|stages| !seen.insert(stages));
+        let (line, faults) = try_all(&Subject::new(&documents, &scenes), if again { MOST_AGAIN } else { MOST_PLANNED }, 7);
+        println!("{path}: {line}");
+        if !faults.is_empty() {
+            all.insert(path, faults);
+        }
+    }
+    let told: Vec<String> =
+        all.iter().flat_map(|(path, faults)| faults.iter().take(MOST_TOLD).map(move |fault| format!("{path} {fault}"))).collect();
+    assert!(told.is_empty(), "{}", told.join("\n"));
+}
+
+/// The scan sees what it is there for: one texel of one node that divides by zero, or takes away light that is not there.
+#[test]
+fn what_is_planted_in_a_shader_is_found_at_its_node() {
+    const DECLARATION: &str = r#"Node(
+        doc: "Adds two kinds of light, but is wrong in one pixel.",
+        inputs: {
+            "direct": Texture(format: Rgba32Float, doc: "W/(m² sr)"),
+            "indirect": Texture(format: Rgba32Float, doc: "W/(m² sr)"),
+        },
+        outputs: { "composed": Texture(format: Rgba32Float, doc: "W/(m² sr)") },
+        steps: [(entry: "compose", over: Texels("composed"))],
+    )"#;
+    const SHADER: &str = "
+        @group(0) @binding(0) var direct: texture_2d<f32>;
+        @group(0) @binding(1) var indirect: texture_2d<f32>;
+        @group(0) @binding(2) var composed: texture_storage_2d<rgba32float, write>;
+        @compute @workgroup_size(8, 8)
+        fn compose(@builtin(global_invocation_id) id: vec3u) {
+            if any(id.xy >= textureDimensions(composed)) {
+                return;
+            }
+            let both = textureLoad(direct, id.xy, 0).rgb + textureLoad(indirect, id.xy, 0).rgb;
+            let distance = vec2f(id.xy) - vec2f(5.0, 3.0);
+            textureStore(composed, id.xy, vec4f(both + PLANTED, 1.0));
+        }";
+    let planted = [
+        ("1e-9 / dot(distance, distance)", "inf"),
+        ("sqrt(dot(distance, distance) - 1e-9)", "NaN"),
+        ("select(0.0, -1e9, all(distance == vec2f(0.0)))", "-10"),
+    ];
+    for (expression, value) in planted {
+        let told = tell(DECLARATION, &SHADER.replace("PLANTED", expression));
+        let place = "frame 0: node `compose` (test/planted) writes `composed`: texel (5, 3) of level 0, layer 0, channel 0 is";
+        assert!(told.contains("on cornell,") && told.contains(&format!("{place} {value}")), "{expression}: {told}");
+    }
+}
+
+/// What the scan says of `acrsm` as it is, on the Cornell box, with another node in the place of the one that adds direct and indirect light.
+fn tell(declaration: &str, shader: &str) -> String {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    for part in ["shaders", "pipelines"] {
+        copy(&root().join(part), &folder.path().join(part));
+    }
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("creatable");
+        fs::write(path, text).expect("writable");
+    };
+    write("shaders/test/planted.ron", declaration);
+    write("shaders/test/planted.wgsl", shader);
+    write("pipelines/planted.ron", "Pipeline(doc: \"x\", extends: \"acrsm.ron\", nodes: [(id: \"compose\", node: \"test/planted\")])");
+    let scenes = scenes(folder.path());
+    let documents = Documents::load(Library::new(Some(folder.path().to_owned()), Vec::new()), Path::new("planted"));
+    let documents = documents.unwrap_or_else(|faults| panic!("{}", faults.render()));
+    let subject = Subject::new(&documents, &scenes);
+    let usual = |factors: &[Factor], plan: &Plan| -> Row {
+        let value = |factor: &Factor| {
+            let (_, value) = plan.params.iter().find(|(name, _)| *name == factor.name).expect("a parameter");
+            let text = if let Value::Choice(option) = value { option.clone() } else { value.to_string() };
+            factor.values.iter().position(|v| *v == text).unwrap_or(0)
+        };
+        factors.iter().map(value).collect()
+    };
+    let plan = documents.plan(&plan_input(&Settings { size: SIZE, ..Settings::default() }, &scenes[0].1)).expect("it can be planned");
+    subject.render(&usual(&subject.factors(), &plan), &scenes[0]).expect_err("it has a fault")
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).expect("creatable");
+    for entry in fs::read_dir(from).expect("readable") {
+        let entry = entry.expect("an entry");
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).expect("copied");
+        }
+    }
+}
