@@ -3,12 +3,15 @@
 //! `cargo bench -p manylight-passes --bench edit` in the repository. Prints median and 95th percentile in milliseconds; asserts nothing,
 //! because times depend on the machine.
 
+mod common;
+
 use std::{
     fs,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
+use common::{Outcome, library_copy, report};
 use manylight_gpu::{Gpu, GpuOptions, watch::Watcher};
 use manylight_graph::{library::Library, pipeline::Pipeline, planner};
 use manylight_passes::{Documents, Renderer, SceneSource, Settings, plan_input};
@@ -18,14 +21,8 @@ const EDITS: usize = 20;
 const FRAMES: usize = 40;
 const PLANS: usize = 100;
 
-type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
-
 fn main() -> Outcome<()> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize()?;
-    let copy = tempfile::tempdir()?;
-    for part in ["shaders", "pipelines"] {
-        copy_folder(&root.join(part), &copy.path().join(part))?;
-    }
+    let (root, copy) = library_copy()?;
     let library = || Library::new(Some(copy.path().to_owned()), Vec::new());
     let scene = SceneSource::file(root.join("assets/cornell.ron"));
     let gpu = Gpu::new(&GpuOptions::default())?;
@@ -73,25 +70,5 @@ fn main() -> Outcome<()> {
         edits.push(saved.elapsed());
     }
     report("saved shader to new picture at 128²", &mut edits);
-    Ok(())
-}
-
-fn report(what: &str, times: &mut [Duration]) {
-    times.sort();
-    let at = |share: f64| times[((times.len() - 1) as f64 * share).round() as usize].as_secs_f64() * 1e3;
-    println!("{what}: median {:.2} ms, p95 {:.2} ms, of {}", at(0.5), at(0.95), times.len());
-}
-
-fn copy_folder(from: &Path, to: &Path) -> Outcome<()> {
-    fs::create_dir_all(to)?;
-    for entry in fs::read_dir(from)? {
-        let entry = entry?;
-        let target = to.join(entry.file_name());
-        if entry.file_type()?.is_dir() {
-            copy_folder(&entry.path(), &target)?;
-        } else {
-            fs::copy(entry.path(), target)?;
-        }
-    }
     Ok(())
 }
