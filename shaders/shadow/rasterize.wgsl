@@ -58,7 +58,8 @@ fn enclose(@builtin(vertex_index) index: u32, @builtin(instance_index) map: u32)
         out.c = ((world_from_object * vec4f(scene_vertices[triangle.c].position, 1.0)).xyz - eye) * frame;
         out.nearest = params.ignored_radius * sqrt(caster.area / PI);
         box = Rectangle(vec2f(1.0), vec2f(-1.0));
-        if caster.state == CLUSTER_ACTIVE && caster.count > 0u {
+        // Of objects that deform there may be fewer triangles than the buffer holds.
+        if caster.state == CLUSTER_ACTIVE && caster.count > 0u && index / 6u < scene_info.triangle_count {
             box = above_horizon(out.a, out.b, out.c);
         }
         // Room for rounding: the texels decide.
