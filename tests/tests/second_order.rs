@@ -212,7 +212,7 @@ fn difference(a: &manylight_gpu::Image, b: &manylight_gpu::Image) -> f64 {
     sum / mean
 }
 
-/// Measured: 16.8 % without, 10.9 % with them.
+/// Measured: 18.0 % without, 12.0 % with them; where pixels meet a ninth of the lights each, 25.0 and 18.4 %.
 #[test]
 fn negative_lights_lower_the_error_by_a_quarter() {
     let job = |name: &str| Job { size: (64, 64), ..Job::asset(name) };
@@ -222,14 +222,12 @@ fn negative_lights_lower_the_error_by_a_quarter() {
         let job = more.iter().fold(second_order(job(name)), |job, (name, value)| job.set(name, value));
         read(&job.set("negative_lights", count).keep(&["indirect"]).render(), "indirect")
     };
-    let none = difference(&light("floating", 0, &[]), &reference);
-    // Where pixels meet a ninth of the lights each, much of the error is that of few lights.
-    let tiled = &[("scheduling", "tiles"), ("tiles", "3")];
-    for (more, most) in [(&[][..], 0.75), (&[("lights", "vpl")], 0.75), (tiled, 0.95)] {
+    for more in [&[][..], &[("lights", "vpl")], &[("scheduling", "tiles"), ("tiles", "3")]] {
+        let none = difference(&light("floating", 0, more), &reference);
         let picture = light("floating", 150, more);
         let some = difference(&picture, &reference);
         println!("without {:.2} %, with negative lights {:.2} % ({more:?})", 100.0 * none, 100.0 * some);
-        assert!(some < most * none, "{more:?}: without {none}, with negative lights {some}");
+        assert!(some < 0.75 * none, "{more:?}: without {none}, with negative lights {some}");
         let least = picture.data.iter().copied().fold(f32::INFINITY, f32::min);
         assert!(least >= 0.0, "{more:?}: negative radiance {least}");
     }
@@ -245,7 +243,7 @@ fn negative_lights_are_no_addition_to_shadows() {
     let run = |set: &str| {
         manylight(&["render", "second_order", "--scene", "cornell", "--size", "8x8", "--frames", "1", "--set", set, "--out", &out])
     };
-    run("visibility=pcss").expect(1).says(&["these values are refused", "negative lights", "`visibility` is `pcss`"]);
+    run("visibility=pcss").expect(1).says(&["these values are refused", "negative lights", "set `visibility` to `none`"]);
     run("negative_lights=0").expect(0);
 }
 
@@ -298,34 +296,18 @@ fn the_share_of_low_resolution_is_what_the_marks_say() {
     }
 }
 
-/// The view shows the marks, also of pictures that are lit in tiles.
 #[test]
-fn the_view_of_the_marks_is_shown_for_any_scheduling() {
+fn the_view_shows_the_marks() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let picture = |name: &str, scheduling: &str| {
-        let file = folder.path().join(name);
-        let out = file.to_string_lossy().into_owned();
-        let set = format!("scheduling={scheduling}");
-        manylight(&[
-            "render",
-            "second_order",
-            "--scene",
-            "cornell",
-            "--size",
-            "32x32",
-            "--set",
-            "view=refined",
-            "--set",
-            &set,
-            "--out",
-            &out,
-        ])
-        .expect(0);
-        read_png(&file)
-    };
-    let (half, tiles) = (picture("a.png", "half"), picture("b.png", "tiles"));
-    assert_eq!(half, tiles);
-    assert!(half.chunks(3).any(|p| p == [255, 0, 0]) && half.chunks(3).any(|p| p != [255, 0, 0]), "red and other pixels");
+    let file = folder.path().join("x.png");
+    let out = file.to_string_lossy().into_owned();
+    manylight(&["render", "second_order", "--scene", "cornell", "--size", "32x32", "--set", "view=refined", "--out", &out]).expect(0);
+    let picture = read_png(&file);
+    let red = picture.chunks(3).filter(|p| *p == [255, 0, 0]).count();
+    let renderer = second_order(Job { size: (32, 32), ..Job::asset("cornell") }).keep(&["refinement"]).render();
+    let json = renderer.read_json("refinement").unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(Some(red as u64), json[0]["refined"].as_u64());
+    assert!(red > 0 && red < 32 * 32, "{red}");
 }
 
 fn read_png(file: &Path) -> Vec<u8> {
