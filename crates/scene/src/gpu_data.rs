@@ -99,6 +99,24 @@ pub struct LightView {
     pub weight: f32,
 }
 
+/// Light of the sky at one time: what a ray meets that leaves the scene, W/(m² sr).
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Sky {
+    /// Radiance straight above.
+    pub zenith: Vec3,
+    /// Share of its light that the sky has at this time; the radiances have it in them.
+    pub daylight: f32,
+    /// Radiance at the horizon.
+    pub horizon: Vec3,
+    /// From horizon to zenith radiance is mixed by the sine of the elevation to this power.
+    pub exponent: f32,
+    /// Radiance below the horizon.
+    pub ground: Vec3,
+    /// 0 if all of it is black.
+    pub is_lit: u32,
+}
+
 /// Counters and sizes of the frame.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
@@ -335,6 +353,7 @@ pub fn layouts() -> Vec<(&'static str, Layout)> {
         layout!(View { clip_from_world, origin, near, right, tan_half_x, up, tan_half_y, forward, far }),
         layout!(Light { position, kind, direction, falloff, strength, beam_rad, cutoff_rad, radius, share, ray_density }),
         layout!(LightView { view, light, kind, face, weight }),
+        layout!(Sky { zenith, daylight, horizon, exponent, ground, is_lit }),
         layout!(Frame { index, seed, time, delta_time }),
         layout!(SceneInfo {
             bounds_min,

@@ -17,6 +17,7 @@
 //! - [`scene`]: [`Scene`], how it is loaded, what it has.
 //! - [`state`]: [`SceneState`], the scene at one time.
 //! - [`motion`]: key frames.
+//! - [`sky`]: the sun over a day, and the light of the sky.
 //! - [`points`]: points on the surfaces for imperfect shadow maps.
 //! - [`gpu_data`]: the structures that shaders read, and their layouts.
 //! - [`files`]: reading from disk, from the program itself, or from anywhere else.
@@ -49,12 +50,17 @@
 //!              beam_deg: 20.0, cutoff_deg: 30.0, falloff: linear), // half-angles; linear, cosine or smooth
 //!         Point(position: (0.0, 1.0, 0.0), intensity: 2.0),             // W/sr in all directions
 //!         Directional(direction: (1.0, -2.0, 0.0), irradiance: 3.0),    // the way its light goes; W/m² on a surface that faces it
+//!         Sun(latitude_deg: 55.5, day: 172.0, irradiance: 4.0,           // goes over the sky in a day; time 0 is midnight
+//!             north_deg: 0.0, fade_deg: 8.0, twilight_deg: 6.0),         // or `declination_deg: 23.4` instead of `day`
 //!     ],
+//!     sky: Sky(zenith: (0.3, 0.5, 0.9), horizon: 0.8, ground: 0.0, exponent: 0.5), // W/(m² sr); or one radiance for all directions
 //!     materials: {"white": (diffuse: (0.7, 0.7, 0.7), specular: 0.2, shininess: 50.0, texture: "wood.png")},
 //! )
 //! ```
 //!
-//! Only `meshes` is needed. A camera or a light that is missing is fitted to the meshes, with a warning. `rotate_deg` may also be three angles:
+//! There may be one `Sun`: its light fades below `fade_deg` of elevation, and that of the sky ends `twilight_deg` below the horizon.
+//!
+//! Only `meshes` is needed; without `sky` there is none. A camera or a light that is missing is fitted to the meshes, with a warning. `rotate_deg` may also be three angles:
 //! about x, then y, then z. Cameras (`origin`, `target`, `up`, `fov_x_deg`) and lights (`position`, `target`, `intensity`; `direction`,
 //! `irradiance`) take `motion` and `repeat` in the same way. Values are mixed linearly from key to key, rotations and directions on the
 //! shortest arc.
@@ -72,6 +78,7 @@ pub mod motion;
 pub mod points;
 mod random;
 pub mod scene;
+pub mod sky;
 pub mod state;
 
 pub use deform::{Deformation, Deformed, Metaballs};

@@ -18,6 +18,7 @@ use crate::{
     import::{Material, Mesh, Textures},
     lights,
     motion::{CameraPose, LightPose, Pose, Repeat, Track},
+    sky::{Sky, SunLight},
     state::SceneState,
 };
 
@@ -83,6 +84,10 @@ pub struct Scene {
     pub textures: Textures,
     /// Lights; empty only if the file says so.
     pub lights: Vec<Light>,
+    /// The light that goes over the sky in a day, if there is one.
+    pub sun: Option<SunLight>,
+    /// What rays meet that leave the scene, by day.
+    pub sky: Sky,
     /// The camera.
     pub camera: Track<CameraPose>,
     /// What buffers need for its geometry at all times, as far as is known.
@@ -125,7 +130,7 @@ impl Scene {
             ("glossy", self.materials.iter().any(|material| material.specular != Vec3::ZERO)),
             ("moving_objects", self.objects.iter().any(|object| object.pose.moves())),
             ("deforming_objects", self.deforms()),
-            ("moving_lights", self.lights.iter().any(|light| light.pose.moves())),
+            ("moving_lights", self.sun.is_some() || self.lights.iter().any(|light| light.pose.moves())),
             ("moving_camera", self.camera.moves()),
             ("several_lights", self.lights.len() > 1),
             ("normals", self.meshes.iter().any(smooth)),
@@ -142,6 +147,9 @@ impl Scene {
         let is_spot = |light: &Light| matches!(light.shape, LightShape::Spot { .. });
         let index = self.lights.iter().position(is_spot).unwrap_or(0);
         let light = self.lights.get_mut(index).ok_or("the scene has no light")?;
+        if self.sun.is_some_and(|sun| sun.light == index) {
+            return Err("the scene's light is a sun, which has a way of its own");
+        }
         let first = path.first().ok_or("the path has no point")?;
         let strength = light.pose.at(first.0).strength;
         let keys = path.iter().map(|&(time, position, target)| (time, LightPose { position, target, strength })).collect();

@@ -5,7 +5,7 @@ use glam::{DMat3, DMat4, DVec3, Mat4};
 use crate::{
     bounds::Bounds,
     deform::Deformed,
-    gpu_data::{Light, LightView, Object, SceneInfo, View},
+    gpu_data::{Light, LightView, Object, SceneInfo, Sky, View},
     import::Mesh,
     lights::{self, NEAR},
     motion::{CameraPose, Pose},
@@ -25,6 +25,8 @@ pub struct SceneState {
     pub lights: Vec<Light>,
     /// What the lights see, in the order of the lights: one view of a spot or directional light, six of a point light. Without lights a dark one.
     pub light_views: Vec<LightView>,
+    /// The light of the sky.
+    pub sky: Sky,
     /// The camera; [`SceneState::camera_view`] makes a view of it.
     pub camera: CameraPose,
     /// Around all objects, world space. Tight around objects that stand still or deform, loose around others.
@@ -39,6 +41,11 @@ const NEAR_OF_TARGET: f64 = 1e-2;
 const NEAR_AT_LEAST: f64 = 1e-6;
 
 impl Scene {
+    /// Share of its light that the sky has at a time: that of the sun, and all of it in a scene without one.
+    pub fn daylight(&self, time: f64) -> f64 {
+        self.sun.as_ref().map_or(1.0, |sun| sun.sun.daylight(time))
+    }
+
     /// The scene at a time in seconds.
     pub fn sample(&self, time: f64) -> SceneState {
         let at = |(mesh, of): (usize, &Mesh)| of.at(time).map(|shape| Deformed { mesh, shape });
@@ -64,7 +71,10 @@ impl Scene {
         if bounds.is_empty() {
             bounds = reach(&self.meshes, &self.objects, time);
         }
-        let light_poses: Vec<_> = self.lights.iter().map(|light| light.pose.at(time)).collect();
+        let mut light_poses: Vec<_> = self.lights.iter().map(|light| light.pose.at(time)).collect();
+        if let Some(sun) = &self.sun {
+            light_poses[sun.light] = sun.sun.pose(time);
+        }
         let mesh_now = |object: &SceneObject| self.shape(object.mesh, &deformed);
         let statistics = |pick: fn(&Mesh) -> f64| self.objects.iter().map(mesh_now).map(pick);
         // Infinite where there is no triangle.
@@ -85,7 +95,8 @@ impl Scene {
         };
         let lights = lights::on_gpu(&self.lights, &light_poses, &bounds);
         let light_views = lights::views(&lights, &light_poses, &bounds);
-        SceneState { time, objects, deformed, lights, light_views, camera: self.camera.at(time), bounds, info }
+        let sky = self.sky.on_gpu(self.daylight(time));
+        SceneState { time, objects, deformed, lights, light_views, sky, camera: self.camera.at(time), bounds, info }
     }
 }
 

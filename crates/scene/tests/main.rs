@@ -12,5 +12,6 @@ mod motion;
 mod points;
 mod robustness;
 mod scene_file;
+mod sky;
 mod state;
 mod textures;

@@ -82,7 +82,7 @@ fn every_fault_has_its_place() {
         (spot("5.0", "5.0, colour: 3"), "colour", &["unknown field `colour` in a spot light"]),
         (light(&format!("Sport({SPOT})")), "Sport", &["expected `Spot(…)` or `Point(…)` or `Directional(…)`", "did you mean `Spot`?"]),
         (light("Poimt(position: (0, 1, 0), intensity: 5)"), "Poimt", &["did you mean `Point`?"]),
-        (light("Sun(direction: (0, -1, 0), irradiance: 5)"), "Sun", &["`Spot`, `Point`, `Directional`"]),
+        (light("Moon(direction: (0, -1, 0), irradiance: 5)"), "Moon", &["`Spot`, `Point`, `Directional`, `Sun`"]),
         (light("3"), "3", &["expected `Spot(…)`", "`Directional(direction: …, irradiance: …)`"]),
         (light("Point(position: (0, 1, 0))"), "Point", &["missing field `intensity`"]),
         (light("Point(position: (0, 1, 0), intensity: 5, target: (0, 0, 0))"), "target", &["unknown field `target` in a point light"]),

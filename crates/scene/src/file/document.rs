@@ -7,14 +7,16 @@ use manylight_graph::{
 };
 
 use super::{
-    light::read_light,
+    light::read_lights,
     motion::read_motion,
     object::{ObjectEntry, read_object},
+    sky::read_sky,
     values::{albedo, checked, point, vector},
 };
 use crate::{
     motion::{CameraPose, Track},
     scene::Light,
+    sky::{Sky, SunLight},
 };
 
 /// A scene file.
@@ -23,6 +25,8 @@ pub(super) struct Document {
     pub(super) objects: Vec<ObjectEntry>,
     pub(super) camera: Option<Track<CameraPose>>,
     pub(super) lights: Option<Vec<Light>>,
+    pub(super) sun: Option<SunLight>,
+    pub(super) sky: Option<Sky>,
     pub(super) materials: Vec<MaterialEntry>,
 }
 
@@ -35,7 +39,7 @@ pub(super) struct MaterialEntry {
     pub(super) texture: Option<Spanned>,
 }
 
-const SCENE: Shape = Shape { what: "a scene", required: &["meshes"], optional: &["camera", "lights", "materials"] };
+const SCENE: Shape = Shape { what: "a scene", required: &["meshes"], optional: &["camera", "lights", "sky", "materials"] };
 const CAMERA: Shape = Shape { what: "a camera", required: &["origin", "target"], optional: &["up", "fov_x_deg", "motion", "repeat"] };
 const CAMERA_KEY: Shape =
     Shape { what: "a key frame of a camera", required: &["time"], optional: &["origin", "target", "up", "fov_x_deg"] };
@@ -59,8 +63,11 @@ pub(super) fn read(reader: &mut Reader, tree: &Tree) -> Document {
         document.objects = list.iter().filter_map(|tree| read_object(reader, tree)).collect();
     }
     document.camera = fields.get("camera").and_then(|tree| read_camera(reader, tree));
-    document.lights =
-        fields.get("lights").map(|tree| reader.list(tree, "lights").iter().filter_map(|tree| read_light(reader, tree)).collect());
+    if let Some(tree) = fields.get("lights") {
+        let (lights, sun) = read_lights(reader, tree);
+        (document.lights, document.sun) = (Some(lights), sun);
+    }
+    document.sky = fields.get("sky").and_then(|tree| read_sky(reader, tree));
     if let Some(tree) = fields.get("materials") {
         let entries = reader.map(tree, "materials");
         document.materials = entries.into_iter().filter_map(|(name, tree)| read_material(reader, name, tree)).collect();

@@ -1,17 +1,24 @@
 //! Lights of scene files.
 
+use std::ops::Range;
+
 use glam::Vec3;
-use manylight_graph::ron::{Fields, Kind, Reader, Shape, Tree, head, suggest};
+use manylight_graph::{
+    diagnostics::Diagnostic,
+    ron::{Fields, Kind, Reader, Shape, Tree, head, suggest},
+};
 
 use super::{
     document::named,
     motion::{read_motion, warn_opposite_directions},
+    sky::read_sun,
     values::{angle, point, strength, vector},
 };
 use crate::{
     gpu_data::Falloff,
     motion::{LightPose, Track},
     scene::{Light, LightShape},
+    sky::{DAY_S, SunLight},
 };
 
 const SPOT: Shape = Shape {
@@ -27,11 +34,35 @@ const DIRECTIONAL_KEY: Shape = Shape { what: "a key frame of a directional light
 
 /// What a light may be, for those who wrote something else.
 const FORMS: &str = "a light is `Spot(position: …, target: …, intensity: …, beam_deg: …, cutoff_deg: …)`, \
-                     `Point(position: …, intensity: …)` or `Directional(direction: …, irradiance: …)`";
+                     `Point(position: …, intensity: …)`, `Directional(direction: …, irradiance: …)` or \
+                     `Sun(latitude_deg: …, day: …, irradiance: …)`";
+
+/// The lights of a scene, and which of them is a sun; faults go to the reader.
+pub(super) fn read_lights(reader: &mut Reader, tree: &Tree) -> (Vec<Light>, Option<SunLight>) {
+    let mut lights = Vec::new();
+    let mut first: Option<(SunLight, Range<usize>)> = None;
+    for tree in reader.list(tree, "lights") {
+        if !matches!(&tree.kind, Kind::Record(Some(name), _) | Kind::Tuple(Some(name), _) if name.text == "Sun") {
+            lights.extend(read_light(reader, tree));
+            continue;
+        }
+        let Some(sun) = read_sun(reader, tree) else { continue };
+        if let Some((_, place)) = &first {
+            let (fault, place) = (reader.span(&head(tree)), reader.span(place));
+            let fault = Diagnostic::error("a scene has at most one sun", fault).and(place, "the other one");
+            reader.out.push(fault.help("write `Directional(…)` with `motion` for further ones"));
+            continue;
+        }
+        first = Some((SunLight { light: lights.len(), sun }, head(tree)));
+        // What it is without its motion: the sun of noon.
+        lights.push(Light { pose: Track::fixed(sun.pose(0.5 * DAY_S)), shape: LightShape::Directional });
+    }
+    (lights, first.map(|(sun, _)| sun))
+}
 
 /// A light; faults go to the reader.
-pub(super) fn read_light(reader: &mut Reader, tree: &Tree) -> Option<Light> {
-    match named(reader, tree, &["Spot", "Point", "Directional"], FORMS)? {
+fn read_light(reader: &mut Reader, tree: &Tree) -> Option<Light> {
+    match named(reader, tree, &["Spot", "Point", "Directional", "Sun"], FORMS)? {
         "Spot" => read_spot(reader, tree),
         "Point" => {
             let fields = reader.record(tree, &POINT)?;

@@ -4,6 +4,7 @@ mod document;
 mod light;
 mod motion;
 mod object;
+mod sky;
 mod values;
 
 use std::{collections::HashMap, path::Path, sync::Arc};
@@ -21,6 +22,7 @@ use crate::{
     import::{Material, Mesh, MeshTriangle, TextureSet, import_obj, nowhere},
     motion::{Pose, Track},
     scene::{Light, Scene, SceneObject},
+    sky::Sky,
     state::{extent, reach},
 };
 use document::{Document, MaterialEntry};
@@ -280,11 +282,12 @@ impl Loader<'_> {
                 .push(nowhere(message).help("write `lights: [Spot(position: …, target: …, intensity: …, beam_deg: …, cutoff_deg: …)]`"));
             vec![light]
         });
-        if lights.is_empty() {
+        if lights.is_empty() && document.sky.is_none_or(|sky| sky.is_black()) {
             self.out
                 .0
                 .push(nowhere("the scene has an empty list of lights: its picture is black").help("leave `lights` out to have one fitted"));
         }
+        let (sun, sky) = (document.sun, document.sky.unwrap_or(Sky::BLACK));
         let Self { files, meshes, materials, textures, out } = self;
         let Files { seen: sources, hash, .. } = files;
         Ok(Scene {
@@ -294,6 +297,8 @@ impl Loader<'_> {
             materials,
             textures: textures.build(),
             lights,
+            sun,
+            sky,
             camera,
             room,
             warnings: out.sorted(),
