@@ -43,6 +43,16 @@ struct LightView {
     weight: f32, // what a texel of it can reflect, over the same of the view where that is most
 }
 
+// Light of the sky at one time: what a ray meets that leaves the scene, W/(m² sr).
+struct Sky {
+    zenith: vec3f,
+    daylight: f32, // share of its light that the sky has at this time; the radiances have it in them
+    horizon: vec3f,
+    exponent: f32, // from horizon to zenith by the sine of the elevation to this power
+    ground: vec3f, // below the horizon
+    is_lit: u32, // 0: all black
+}
+
 // Counters and sizes of the frame.
 struct Frame {
     index: u32, // frames since the last reset

@@ -1,6 +1,6 @@
 // Progressive mean and standard error from independent batches: every frame is one. Welford's update keeps small variances of large means.
 
-#import common::scene::{Frame, View, SceneInfo, Light}
+#import common::scene::{Frame, View, SceneInfo, Light, Sky}
 #import common::random::hash
 
 struct Params {
@@ -11,16 +11,17 @@ struct Params {
 @group(0) @binding(1) var<uniform> scene_camera: View;
 @group(0) @binding(2) var<uniform> scene_info: SceneInfo;
 @group(0) @binding(3) var<storage, read> scene_lights: array<Light>;
-@group(0) @binding(4) var<uniform> params: Params;
-@group(0) @binding(5) var traced: texture_2d<f32>;
-@group(0) @binding(6) var sum_previous: texture_2d<f32>;
-@group(0) @binding(7) var squares_previous: texture_2d<f32>;
-@group(0) @binding(8) var<storage, read> key_previous: array<u32>;
-@group(0) @binding(9) var sum: texture_storage_2d<rgba32float, write>;
-@group(0) @binding(10) var squares: texture_storage_2d<rgba32float, write>;
-@group(0) @binding(11) var<storage, read_write> key: array<u32>;
-@group(0) @binding(12) var composed: texture_storage_2d<rgba32float, write>;
-@group(0) @binding(13) var standard_error: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(4) var<uniform> scene_sky: Sky;
+@group(0) @binding(5) var<uniform> params: Params;
+@group(0) @binding(6) var traced: texture_2d<f32>;
+@group(0) @binding(7) var sum_previous: texture_2d<f32>;
+@group(0) @binding(8) var squares_previous: texture_2d<f32>;
+@group(0) @binding(9) var<storage, read> key_previous: array<u32>;
+@group(0) @binding(10) var sum: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(11) var squares: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(12) var<storage, read_write> key: array<u32>;
+@group(0) @binding(13) var composed: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(14) var standard_error: texture_storage_2d<rgba32float, write>;
 
 fn mix(seed: u32, v: vec4f) -> u32 {
     let b = bitcast<vec4u>(v);
@@ -41,7 +42,8 @@ fn current_key() -> u32 {
         h = mix(h, vec4f(light.direction, light.cutoff_rad));
         h = mix(h, vec4f(light.strength, 0.0));
     }
-    return h;
+    h = mix(h, vec4f(scene_sky.zenith, scene_sky.exponent));
+    return mix(mix(h, vec4f(scene_sky.horizon, 0.0)), vec4f(scene_sky.ground, 0.0));
 }
 
 @compute @workgroup_size(1)

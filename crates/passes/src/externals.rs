@@ -29,6 +29,7 @@ const ENTRIES: &[Entry] = &[
     uniform("frame", "Frame", "number of the frame, seed, scene time"),
     uniform("scene_camera", "View", "the camera"),
     uniform("scene_info", "SceneInfo", "bounds, areas and counts of the scene at this time"),
+    uniform("scene_sky", "Sky", "light of the sky at this time, W/(m² sr); black if the scene has none"),
     buffer("scene_lights", "Light", "all lights of all kinds at this time, world space; one dark light if there are none"),
     buffer(
         "scene_light_views",
@@ -112,6 +113,7 @@ fn size_of_element(element: &str) -> u32 {
         "Light" => size_of::<Light>(),
         "LightView" => size_of::<LightView>(),
         "SceneInfo" => size_of::<SceneInfo>(),
+        "Sky" => size_of::<gpu_data::Sky>(),
         "Vertex" => size_of::<gpu_data::Vertex>(),
         "Triangle" => size_of::<gpu_data::Triangle>(),
         "Object" => size_of::<gpu_data::Object>(),
@@ -153,10 +155,11 @@ impl SceneUpload {
             self.scene = Some(scene.hash);
         }
         let camera = state.camera_view(aspect);
-        let parts: [(&'static str, &[u8]); 6] = [
+        let parts: [(&'static str, &[u8]); 7] = [
             ("frame", bytes_of(frame)),
             ("scene_camera", bytes_of(&camera)),
             ("scene_info", bytes_of(&state.info)),
+            ("scene_sky", bytes_of(&state.sky)),
             ("scene_lights", cast_slice(&state.lights)),
             ("scene_light_views", cast_slice(&state.light_views)),
             ("scene_objects", cast_slice(&state.objects)),
