@@ -102,7 +102,6 @@ pub struct Cluster {
     pub texel: [f64; 2],
     pub count: u64,
     pub state: u64,
-    pub generation: u64,
     pub generation: u32,
 }
 
@@ -125,7 +124,6 @@ pub fn read_clusters(renderer: &Renderer, resource: &str) -> Vec<Cluster> {
             texel: numbers(&c["texel"]),
             count: c["count"].as_u64().expect("count"),
             state: c["state"].as_u64().expect("state"),
-            generation: c["generation"].as_u64().expect("generation"),
             generation: c["generation"].as_u64().and_then(|g| g.try_into().ok()).expect("generation"),
         })
         .collect()
