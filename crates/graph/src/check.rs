@@ -60,7 +60,7 @@ pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
     // Without knowing what is refused, all that would follow from it would be told.
     let is_preset = !pipeline.set.is_empty();
     // The ends of ranges are for the values that a pipeline has by itself; a preset is one choice of them.
-    let is_tried = |kind: &ParamKind| !linked.refusals_unclear && !(is_preset && matches!(kind, ParamKind::Int { .. }));
+    let is_tried = |kind: &ParamKind| !linked.refusals_unclear && (!is_preset || !matches!(kind, ParamKind::Int { .. }));
     for (name, param) in pipeline.params.iter().filter(|(_, param)| is_tried(&param.kind)) {
         let current = values.get(name).cloned();
         // The end of a range may be too much beside another parameter's value (memory, say), and a preset may set what another option needs:
