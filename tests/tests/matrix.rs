@@ -26,8 +26,10 @@ const SIZE: (u32, u32) = (24, 16);
 const FRAMES: u32 = 2;
 /// Seconds from frame to frame: what moves has moved.
 const STEP: f64 = 0.5;
-/// Whole numbers above this (sizes, counts) are set to it, or to the least that they may be.
+/// Whole numbers above this are set to it, or to the least that they may be.
 const SMALL: i64 = 32;
+/// The same of counts, which are room for what a scene asks for: with less, a node may say that it needs more.
+const SMALL_COUNT: i64 = 16_384;
 /// Of larger products, so many combinations are planned, chosen evenly.
 const MOST_PLANNED: usize = 100_000;
 /// So many where another pipeline of the same stages has all of them: only the numbers differ.
@@ -86,9 +88,10 @@ impl<'a> Subject<'a> {
                 ParamKind::Bool { .. } => options.push(factor(switch())),
                 ParamKind::Int { min, default, .. } => {
                     let usual = preset(name).and_then(|value| value.parse().ok()).unwrap_or(*default);
-                    let small = usual.min(SMALL).max(*min);
-                    let mut values = vec![small.to_string(), min.to_string()];
-                    values.dedup();
+                    let is_count = name.ends_with("_count");
+                    let small = usual.min(if is_count { SMALL_COUNT } else { SMALL }).max(*min);
+                    let mut values = vec![small.to_string()];
+                    values.extend((!is_count && small > *min).then(|| min.to_string()));
                     numbers.push(factor(values));
                 }
                 ParamKind::Float { .. } => {}
@@ -104,6 +107,7 @@ impl<'a> Subject<'a> {
 
     fn settings(&self, factors: &[Factor], row: &[usize]) -> Settings {
         let mut set = self.small();
+        set.retain(|(name, _)| factors.iter().all(|factor| factor.name != *name));
         set.extend(factors.iter().zip(row).map(|(factor, &value)| (factor.name.clone(), factor.values[value].clone())));
         Settings { size: SIZE, set, ..Settings::default() }
     }
