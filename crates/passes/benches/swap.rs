@@ -1,7 +1,7 @@
 //! How long a user waits after choosing another option of a running pipeline, and what of it is kept.
 //!
 //! `cargo bench -p manylight-passes --bench swap [-- PIPELINE…]` in the repository; without names, every pipeline. A document that sets the
-//! option is saved, as in `watch`: times are from there to the new picture at 128², for each option of each choice and switch, one at a
+//! option is saved, as in `watch`: times are from there to the new picture at 128² with an RSM of 256², for each option of each choice and switch, one at a
 //! time, when its shaders are first compiled and when they are known. Asserts nothing, because times depend on the machine.
 
 mod common;
@@ -15,9 +15,11 @@ use std::{
 use common::{Outcome, library_copy, report};
 use manylight_gpu::{Gpu, GpuOptions, watch::Watcher};
 use manylight_graph::{library::Library, value::ParamKind};
-use manylight_passes::{ReloadReport, Renderer, SceneSource, Settings};
+use manylight_passes::{Documents, ReloadReport, Renderer, SceneSource, Settings};
 
 const SIDE: u32 = 128;
+/// Side of the reflective shadow map, where there is one.
+const RSM: &str = "256";
 /// Frames before the first swap: clusters have settled somewhat, all memory is there.
 const FRAMES: usize = 3;
 /// No change takes longer to be told.
@@ -31,14 +33,16 @@ fn main() -> Outcome<()> {
     let part = |path: &String| path["pipelines/".len()..].contains('/');
     let paths = library.list("pipelines", "ron").into_iter().filter(|path| !part(path));
     let names: Vec<String> = paths.filter_map(|path| Some(Path::new(&path).file_stem()?.to_string_lossy().into_owned())).collect();
-    println!("milliseconds from the saved document to the new picture at {SIDE}²; kept and compiled: nodes; reset and kept: histories");
+    println!(
+        "milliseconds from the saved document to the new picture at {SIDE}², RSM {RSM}²; kept and compiled: nodes; reset and kept: histories"
+    );
     for name in names.iter().filter(|name| wanted.is_empty() || wanted.contains(name)) {
         // A device of its own: another pipeline's shaders are no help.
         let gpu = Gpu::new(&GpuOptions::default())?;
         let mut swaps = Swaps::new(&gpu, &library, copy.path(), name, scene.clone())?;
         println!("{name} on {} ({}), a frame of it takes {:.0} ms", gpu.adapter_info().name, gpu.kind(), millis(swaps.frame()?));
         swaps.all()?;
-        report(&format!("{name}, frame after the swap"), &mut swaps.frames);
+        report(&format!("{name}, to a new frame that is ready to run"), &mut swaps.ready);
         report(&format!("{name}, to a new picture, first"), &mut swaps.first);
         report(&format!("{name}, to a new picture, again"), &mut swaps.again);
     }
@@ -53,18 +57,22 @@ struct Swaps {
     pipeline: String,
     first: Vec<Duration>,
     again: Vec<Duration>,
-    frames: Vec<Duration>,
+    ready: Vec<Duration>,
 }
 
 impl Swaps {
     fn new(gpu: &Gpu, library: &Library, root: &Path, pipeline: &str, scene: SceneSource) -> Outcome<Self> {
         let document = root.join("pipelines/swap.ron");
         fs::write(&document, text(pipeline, ""))?;
-        let settings = Settings { size: (SIDE, SIDE), ..Settings::default() };
-        let renderer = Renderer::new(gpu, library.clone(), "swap", scene, settings)?;
+        let documents = Documents::load(library.clone(), Path::new("swap"))?;
+        let has_map = documents.pipeline().params.contains_key("rsm_size");
+        let set = has_map.then(|| ("rsm_size".to_owned(), RSM.to_owned())).into_iter().collect();
+        let settings = Settings { size: (SIDE, SIDE), set, ..Settings::default() };
+        let loaded = scene.load()?;
+        let renderer = Renderer::with(gpu, documents, scene, loaded, settings)?;
         let watcher = Watcher::new(renderer.watch_set())?;
-        let (first, again, frames) = (Vec::new(), Vec::new(), Vec::new());
-        let mut swaps = Self { renderer, watcher, document, pipeline: pipeline.to_owned(), first, again, frames };
+        let (first, again, ready) = (Vec::new(), Vec::new(), Vec::new());
+        let mut swaps = Self { renderer, watcher, document, pipeline: pipeline.to_owned(), first, again, ready };
         for _ in 0..FRAMES {
             swaps.frame()?;
         }
@@ -135,7 +143,7 @@ impl Swaps {
             );
             self.first.push(first);
             self.again.push(again);
-            self.frames.push(frame);
+            self.ready.push(first.saturating_sub(frame));
         }
         Ok(())
     }

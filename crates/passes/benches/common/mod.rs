@@ -21,6 +21,9 @@ pub fn library_copy() -> Outcome<(PathBuf, tempfile::TempDir)> {
 /// Prints median, 95th percentile and the longest time.
 pub fn report(what: &str, times: &mut [Duration]) {
     times.sort();
+    if times.is_empty() {
+        return println!("{what}: nothing to measure");
+    }
     let at = |share: f64| times[((times.len() - 1) as f64 * share).round() as usize].as_secs_f64() * 1e3;
     println!("{what}: median {:.2} ms, p95 {:.2} ms, longest {:.2} ms, of {}", at(0.5), at(0.95), at(1.0), times.len());
 }
