@@ -2,12 +2,12 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::OnceLock,
+    sync::{Arc, OnceLock},
 };
 
 use manylight_gpu::{Gpu, GpuOptions, Image};
 use manylight_graph::{library::Library, plan::Debug};
-use manylight_passes::{Renderer, SceneSource, Settings};
+use manylight_passes::{Baked, Renderer, SceneSource, Settings};
 
 use crate::support::root;
 
@@ -26,6 +26,8 @@ pub struct Job {
     pub set: Vec<(String, String)>,
     pub keep: Vec<String>,
     pub debug: Debug,
+    pub seed: u32,
+    pub baked: Option<Arc<Baked>>,
 }
 
 impl Job {
@@ -44,6 +46,8 @@ impl Job {
             set: Vec::new(),
             keep: Vec::new(),
             debug: Debug::default(),
+            seed: 0,
+            baked: None,
         }
     }
 
@@ -62,6 +66,11 @@ impl Job {
         self
     }
 
+    /// Precomputed light for pipelines that read it.
+    pub fn baked(self, baked: &Arc<Baked>) -> Self {
+        Self { baked: Some(Arc::clone(baked)), ..self }
+    }
+
     pub fn frames(self, frames: u32) -> Self {
         Self { frames, ..self }
     }
@@ -69,7 +78,14 @@ impl Job {
     /// A renderer that has rendered nothing yet.
     #[track_caller]
     pub fn renderer(&self) -> Renderer {
-        let settings = Settings { size: self.size, set: self.set.clone(), keep: self.keep.clone(), debug: self.debug, seed: 0 };
+        let settings = Settings {
+            size: self.size,
+            set: self.set.clone(),
+            keep: self.keep.clone(),
+            debug: self.debug,
+            seed: self.seed,
+            baked: self.baked.clone(),
+        };
         let library = Library::new(Some(root()), Vec::new());
         Renderer::new(gpu(), library, &self.pipeline, SceneSource::file(&self.scene), settings).unwrap_or_else(|e| panic!("{e}"))
     }

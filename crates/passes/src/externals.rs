@@ -14,8 +14,13 @@ use manylight_scene::{
     gpu_data::{self, Frame, Light, LightView, SceneInfo, View},
 };
 
+use crate::baked::Baked;
+
 /// The scene's texture array.
 const TEXTURES: &str = "scene_textures";
+
+/// Precomputed light.
+const BAKED: &str = "baked_light";
 
 /// What an external holds and what it is for.
 struct Entry {
@@ -40,6 +45,7 @@ const ENTRIES: &[Entry] = &[
     buffer("scene_triangles", "Triangle", "triangles of all objects at this time; those beyond `scene_info.triangle_count` have no area"),
     buffer("scene_objects", "Object", "transforms of all objects at this time"),
     buffer("scene_materials", "Material", "linear albedo, specular colour and exponent, texture of all materials"),
+    buffer("baked_weights", "f32", "what each layer of `baked_light` is multiplied with at this time"),
 ];
 
 const fn uniform(name: &'static str, element: &'static str, doc: &'static str) -> Entry {
@@ -63,6 +69,12 @@ pub fn declarations() -> Vec<External> {
         })
         .collect();
     all.push(External {
+        name: BAKED.to_owned(),
+        kind: PortKind::Texture { format: Some(Format::Rgba16Float), array: true },
+        doc: "precomputed light: mean, components, sky, one a layer; one black texel without a baked file".to_owned(),
+        layout: None,
+    });
+    all.push(External {
         name: TEXTURES.to_owned(),
         kind: PortKind::Texture { format: Some(Format::Rgba8UnormSrgb), array: true },
         doc: "textures of the materials, one a layer, all of one size; one white texel if there are none".to_owned(),
@@ -72,8 +84,9 @@ pub fn declarations() -> Vec<External> {
 }
 
 /// Sizes of the externals for a scene, as a plan needs them; no GPU is asked.
-pub fn descriptions(scene: &Scene) -> BTreeMap<String, ResourceDesc> {
+pub fn descriptions(scene: &Scene, baked: Option<&Baked>) -> BTreeMap<String, ResourceDesc> {
     let count = |name: &str| match name {
+        "baked_weights" => baked.map_or(0, |b| b.header.layers()),
         "scene_lights" => scene.lights.len(),
         "scene_light_views" => scene.light_view_count(),
         "scene_vertices" => scene.room.vertices,
@@ -90,6 +103,19 @@ pub fn descriptions(scene: &Scene) -> BTreeMap<String, ResourceDesc> {
         }
     };
     let mut all: BTreeMap<_, _> = ENTRIES.iter().map(|e| (e.name.to_owned(), describe(e))).collect();
+    let header = baked.map(|b| &b.header);
+    all.insert(
+        BAKED.to_owned(),
+        ResourceDesc::Texture {
+            format: Format::Rgba16Float,
+            width: header.map_or(1, |h| h.width as u32),
+            height: header.map_or(1, |h| h.height as u32),
+            layers: header.map_or(1, |h| h.layers() as u32),
+            array: true,
+            mips: 1,
+            encoding: Encoding::Plain,
+        },
+    );
     let textures = &scene.textures;
     all.insert(
         TEXTURES.to_owned(),
@@ -116,6 +142,7 @@ fn size_of_element(element: &str) -> u32 {
         "Sky" => size_of::<gpu_data::Sky>(),
         "Vertex" => size_of::<gpu_data::Vertex>(),
         "Triangle" => size_of::<gpu_data::Triangle>(),
+        "f32" => size_of::<f32>(),
         "Object" => size_of::<gpu_data::Object>(),
         _ => size_of::<gpu_data::Material>(),
     };
@@ -127,6 +154,8 @@ fn size_of_element(element: &str) -> u32 {
 pub struct SceneUpload {
     /// Hash of the scene whose static data are on the GPU.
     scene: Option<u64>,
+    /// Whether precomputed light is on the GPU.
+    baked: bool,
     /// Bytes on the GPU of what may change from frame to frame.
     known: BTreeMap<&'static str, Vec<u8>>,
 }
@@ -174,6 +203,19 @@ impl SceneUpload {
         Ok(())
     }
 
+    /// Makes the externals hold precomputed light at the time of a state; always the same light.
+    ///
+    /// # Errors
+    /// Its texture is larger than the device allows.
+    pub fn upload_baked(&mut self, gpu: &Gpu, externals: &mut Externals, baked: Option<&Baked>, state: &SceneState) -> Result<(), Fault> {
+        if !self.baked {
+            upload_layers(gpu, externals, baked)?;
+            self.baked = true;
+        }
+        let weights = baked.map_or_else(Vec::new, |baked| baked.weights_at(state.time, f64::from(state.sky.daylight)));
+        self.set(gpu, externals, "baked_weights", cast_slice(&weights))
+    }
+
     fn set(&mut self, gpu: &Gpu, externals: &mut Externals, name: &'static str, bytes: &[u8]) -> Result<(), Fault> {
         if self.known.get(name).is_some_and(|known| known == bytes) {
             return Ok(());
@@ -214,6 +256,12 @@ fn upload_static(gpu: &Gpu, externals: &mut Externals, scene: &Scene) -> Result<
     )
 }
 
+fn upload_layers(gpu: &Gpu, externals: &mut Externals, baked: Option<&Baked>) -> Result<(), Fault> {
+    let layers: Vec<&[u8]> = baked.map_or_else(Vec::new, |baked| baked.layers().collect());
+    let (width, height) = baked.map_or((1, 1), |baked| (baked.header.width as u32, baked.header.height as u32));
+    externals.set_texture_array(gpu, BAKED, TextureArray { format: Format::Rgba16Float, width, height, mips: 1, layers: &layers })
+}
+
 /// The texels layer by layer with all levels of each; the scene has them level by level with all layers of each.
 fn texture_layers(scene: &Scene) -> Vec<Vec<u8>> {
     let textures = &scene.textures;
@@ -236,8 +284,9 @@ mod tests {
         for external in declarations() {
             match &external.kind {
                 PortKind::Buffer { of } | PortKind::Uniform { of } => {
-                    let layout = external.layout.as_ref().expect("a layout for each structure");
-                    assert_eq!(layout.size, size_of_element(of), "{of}");
+                    let is_plain = of == "f32";
+                    let size = external.layout.as_ref().map(|layout| layout.size);
+                    assert_eq!(size, (!is_plain).then(|| size_of_element(of)), "a layout for each structure: {of}");
                 }
                 PortKind::Texture { .. } => assert!(external.layout.is_none()),
             }

@@ -19,10 +19,12 @@
 //!
 //! - [`renderer`]: [`Renderer`], the library's front door: render, read, reload.
 //! - [`documents`]: a library with its nodes and a pipeline; plans without a GPU.
+//! - [`baked`]: precomputed indirect light, its file and its weights.
 //! - [`externals`]: scene and frame data as pipelines see them.
 //! - [`host`]: the nodes that are written in Rust.
 //! - [`scene_source`]: where a scene is loaded from.
 
+pub mod baked;
 mod bvh;
 pub mod documents;
 pub mod externals;
@@ -31,6 +33,7 @@ mod points_static;
 pub mod renderer;
 pub mod scene_source;
 
+pub use baked::Baked;
 pub use documents::{Documents, load_registry};
 pub use host::HostScene;
 pub use renderer::{ReloadReport, RenderError, Renderer, Settings, plan_input};

@@ -20,6 +20,7 @@ use manylight_scene::{Scene, gpu_data};
 use thiserror::Error;
 
 use crate::{
+    baked::Baked,
     documents::Documents,
     externals::{SceneUpload, descriptions},
     host::{self, HostScene},
@@ -39,6 +40,8 @@ pub struct Settings {
     pub debug: Debug,
     /// Seed of everything random.
     pub seed: u32,
+    /// Precomputed light for pipelines that read it.
+    pub baked: Option<Arc<Baked>>,
 }
 
 /// Why there is no frame.
@@ -69,7 +72,7 @@ impl From<Fault> for RenderError {
 pub struct ReloadReport {
     /// Nodes and histories that were kept, rebuilt and reset.
     pub build: BuildReport,
-    /// Whether another scene is rendered now.
+    /// Whether another scene, or one with other baked light, is rendered now.
     pub scene_changed: bool,
     /// Faults of nodes that the pipeline does not use, and warnings.
     pub warnings: Diagnostics,
@@ -89,6 +92,8 @@ pub struct Renderer {
     scene: LoadedScene,
     frame: Frame,
     last_time: Option<f64>,
+    /// Frames run before the last restart.
+    first: u64,
 }
 
 /// A scene with its data on the GPU.
@@ -100,15 +105,17 @@ struct LoadedScene {
     externals: Externals,
     /// Whether the plan is made for less geometry than there is room for now.
     outgrown: bool,
+    baked: Option<Arc<Baked>>,
 }
 
 impl LoadedScene {
     /// A scene as it is at a time.
-    fn new(source: SceneSource, mut scene: Scene, seed: u32, time: f64) -> Self {
+    fn new(source: SceneSource, mut scene: Scene, settings: &Settings, time: f64) -> Self {
         let state = scene.sample(time);
         scene.make_room(&state);
-        let host = HostScene { scene: Arc::new(scene), seed, state };
-        Self { source, host, upload: SceneUpload::new(), externals: Externals::new(), outgrown: false }
+        let host = HostScene { scene: Arc::new(scene), seed: settings.seed, state };
+        let baked = settings.baked.clone();
+        Self { source, host, upload: SceneUpload::new(), externals: Externals::new(), outgrown: false, baked }
     }
 
     /// Goes to another time.
@@ -122,7 +129,8 @@ impl LoadedScene {
 
     fn upload(&mut self, gpu: &Gpu, size: (u32, u32), frame: &gpu_data::Frame) -> Result<(), Fault> {
         let aspect = size.0 as f32 / size.1 as f32;
-        self.upload.upload(gpu, &mut self.externals, &self.host.scene, &self.host.state, frame, aspect)
+        self.upload.upload(gpu, &mut self.externals, &self.host.scene, &self.host.state, frame, aspect)?;
+        self.upload.upload_baked(gpu, &mut self.externals, self.baked.as_deref(), &self.host.state)
     }
 
     /// Changes with the scene and with the seed.
@@ -131,13 +139,36 @@ impl LoadedScene {
     }
 }
 
+/// Fails where a plan needs baked light and has none that fits scene and picture.
+fn check_baked(plan: &Plan, settings: &Settings, scene: &Scene) -> Result<(), Diagnostics> {
+    let fault = |message: String, help: &str| Diagnostics(vec![Diagnostic::error_nowhere(message).help(help)]);
+    if plan.resource("baked_weights").is_none() {
+        return Ok(());
+    }
+    let Some(baked) = &settings.baked else {
+        let help = "make it by `manylight bake SCENE --out FILE.baked`, and give it by `--baked FILE.baked`";
+        return Err(fault("the pipeline shows precomputed light, and there is none".to_owned(), help));
+    };
+    baked.check_scene(scene).map_err(|e| fault(format!("the baked light cannot be used: {e}"), "the command is `manylight bake`"))?;
+    let ((width, height), header) = (settings.size, &baked.header);
+    let (own, other) = (f64::from(width) / f64::from(height), header.width as f64 / header.height as f64);
+    if (own / other - 1.0).abs() > ASPECT_TOLERANCE {
+        let message = format!("the light was baked for a picture of {}×{}, not for one of {width}×{height}", header.width, header.height);
+        return Err(fault(message, "render in the same proportions, or bake it again with another --size"));
+    }
+    Ok(())
+}
+
+/// By so much the proportions of a picture may differ from those that light was baked for: rounding of sides.
+const ASPECT_TOLERANCE: f64 = 0.02;
+
 /// What a plan depends on besides pipeline and nodes; needs no GPU.
 pub fn plan_input(settings: &Settings, scene: &Scene) -> PlanInput {
     PlanInput {
         output: settings.size,
         set: settings.set.clone(),
         features: scene.features(),
-        externals: descriptions(scene),
+        externals: descriptions(scene, settings.baked.as_deref()),
         keep: settings.keep.clone(),
         debug: settings.debug,
     }
@@ -166,11 +197,12 @@ impl Renderer {
     /// As [`Renderer::new`].
     pub fn with(gpu: &Gpu, documents: Documents, source: SceneSource, scene: Scene, settings: Settings) -> Result<Self, RenderError> {
         let hosts = host::nodes();
-        let mut scene = LoadedScene::new(source, scene, settings.seed, 0.0);
+        let mut scene = LoadedScene::new(source, scene, &settings, 0.0);
         let plan = documents.plan(&plan_input(&settings, &scene.host.scene))?;
+        check_baked(&plan, &settings, &scene.host.scene)?;
         scene.upload(gpu, settings.size, &gpu_data::Frame { seed: settings.seed, ..Default::default() })?;
         let (frame, _) = build(gpu, &plan, &scene, &hosts, None, &settings)?;
-        Ok(Self { gpu: gpu.clone(), documents, hosts, settings, scene, frame, last_time: None })
+        Ok(Self { gpu: gpu.clone(), documents, hosts, settings, scene, frame, last_time: None, first: 0 })
     }
 
     /// Renders the scene at a time in seconds. Returns when the frame is submitted, not when it is done.
@@ -182,7 +214,7 @@ impl Renderer {
     /// A host node failed, the scene outgrew the device, or the device is lost.
     pub fn render_frame(&mut self, time: f64) -> Result<(), RenderError> {
         let frame = gpu_data::Frame {
-            index: self.frame.index() as u32,
+            index: (self.frame.index() - self.first.min(self.frame.index())) as u32,
             seed: self.settings.seed,
             time: time as f32,
             delta_time: self.last_time.map_or(0.0, |last| (time - last) as f32),
@@ -197,6 +229,12 @@ impl Renderer {
         self.frame.record_and_submit(&self.gpu, &self.scene.externals, data)?;
         self.last_time = Some(time);
         Ok(())
+    }
+
+    /// Counts frames from 0 again: what is accumulated over frames starts anew, and everything random is as it was in the first frame.
+    pub fn restart(&mut self) {
+        self.first = self.frame.index();
+        self.last_time = None;
     }
 
     /// Reads a texture of the latest frame: the picture, the radiance, a history, or one named in [`Settings::keep`]. Waits for the GPU.
@@ -336,9 +374,16 @@ impl Renderer {
         let new_settings = settings.as_ref().unwrap_or(&self.settings);
         let new_documents = documents.as_ref().unwrap_or(&self.documents);
         let time = self.last_time.unwrap_or(0.0) as f32;
-        let mut new_scene = scene.map(|scene| LoadedScene::new(self.scene.source.clone(), scene, new_settings.seed, time.into()));
+        // Light that was baked is on the GPU with the scene.
+        let baked_changed = match (&new_settings.baked, &self.scene.baked) {
+            (Some(new), Some(old)) => !Arc::ptr_eq(new, old),
+            (new, old) => new.is_some() != old.is_some(),
+        };
+        let scene = scene.or_else(|| baked_changed.then(|| Scene::clone(&self.scene.host.scene)));
+        let mut new_scene = scene.map(|scene| LoadedScene::new(self.scene.source.clone(), scene, new_settings, time.into()));
         let described = new_scene.as_ref().map_or(&self.scene.host.scene, |s| &s.host.scene);
         let plan = new_documents.plan(&plan_input(new_settings, described))?;
+        check_baked(&plan, new_settings, described)?;
         if let Some(scene) = &mut new_scene {
             let frame = gpu_data::Frame { seed: new_settings.seed, time, ..Default::default() };
             scene.upload(&self.gpu, new_settings.size, &frame).map_err(|f| Diagnostics(vec![Diagnostic::error_nowhere(f.to_string())]))?;

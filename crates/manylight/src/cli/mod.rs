@@ -106,6 +106,9 @@ pub struct FrameArgs {
     /// Seed of everything random
     #[arg(long, default_value_t = 0)]
     pub seed: u32,
+    /// Precomputed light for the pipeline, a file of `manylight bake`
+    #[arg(long, value_name = "FILE")]
+    pub baked: Option<PathBuf>,
     /// Use the adapter whose name contains this (see `manylight adapters`)
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<String>,

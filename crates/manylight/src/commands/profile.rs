@@ -33,7 +33,7 @@ pub fn run(cli: &Cli, args: &ProfileArgs) -> Result<(), Fault> {
     }
     let session = Session::open(cli, &args.pipeline.pipeline)?;
     let scene = session.scene(&args.frame.scene)?;
-    let settings = settings(&args.pipeline, &args.frame, Vec::new());
+    let settings = settings(&args.pipeline, &args.frame, Vec::new())?;
     session.plan(Some(&scene), &settings)?;
     let gpu = super::open_gpu(args.frame.adapter.as_ref())?;
     let mut renderer = session.renderer(&gpu, scene, settings)?;

@@ -1,6 +1,6 @@
 //! The library, a pipeline and a scene as the command line names them; plans without a GPU.
 
-use std::path::Path;
+use std::{fs, path::Path, sync::Arc};
 
 use manylight::{
     Documents, SceneSource, Settings,
@@ -10,7 +10,9 @@ use manylight::{
         pipeline::Pipeline,
         plan::{Debug, Plan, PlanInput},
     },
-    library, plan_input,
+    library,
+    passes::Baked,
+    plan_input,
     renderer::{RenderError, Renderer},
     scene::Scene,
 };
@@ -70,8 +72,16 @@ impl Session {
 }
 
 /// Settings as the command line gives them.
-pub fn settings(pipeline: &PipelineArgs, frame: &FrameArgs, keep: Vec<String>) -> Settings {
-    Settings { size: frame.size.size, set: pipeline.set.clone(), keep, debug: debug(&frame.debug), seed: frame.seed }
+pub fn settings(pipeline: &PipelineArgs, frame: &FrameArgs, keep: Vec<String>) -> Result<Settings, Fault> {
+    let baked = frame.baked.as_deref().map(baked).transpose()?.map(Arc::new);
+    Ok(Settings { size: frame.size.size, set: pipeline.set.clone(), keep, debug: debug(&frame.debug), seed: frame.seed, baked })
+}
+
+/// Reads a file of baked light.
+fn baked(file: &Path) -> Result<Baked, Fault> {
+    let fault = |reason: String| Fault::Input(format!("cannot use `{}`: {reason}", file.display()));
+    let bytes = fs::read(file).map_err(|e| fault(e.to_string()))?;
+    Baked::from_bytes(&bytes).map_err(|e| fault(e.to_string()))
 }
 
 fn debug(args: &DebugArgs) -> Debug {

@@ -27,7 +27,7 @@ pub fn run(cli: &Cli, args: &WatchArgs) -> Result<(), Fault> {
     outputs.check_files(None)?;
     let session = Session::open(cli, &args.pipeline.pipeline)?;
     let scene = session.scene(&args.frame.scene)?;
-    let settings = settings(&args.pipeline, &args.frame, Vec::new());
+    let settings = settings(&args.pipeline, &args.frame, Vec::new())?;
     outputs.check_plan(&session.plan(Some(&scene), &settings)?)?;
     let gpu = super::open_gpu(args.frame.adapter.as_ref())?;
     let renderer = session.renderer(&gpu, scene, settings)?;
