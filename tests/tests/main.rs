@@ -14,6 +14,7 @@ mod matrix;
 mod metrics;
 mod moving_light;
 mod path_tracer;
+mod precomputed;
 mod reference;
 mod renders;
 mod samples;

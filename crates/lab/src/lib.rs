@@ -15,8 +15,10 @@
 //! - [`sweep`]: many runs of pipelines, from one document; [`tune`]: the setting to use.
 //! - [`record`]: what a run cost and how far it is off, as JSON Lines; [`sheet`]: how a report shows them; [`report`]: reports as HTML, Markdown
 //!   and CSV.
+//! - [`bake`]: precomputed indirect light.
 //! - [`timing`]: times of frames and nodes; [`facts`]: adapter and parameters as JSON.
 
+pub mod bake;
 pub mod facts;
 pub mod files;
 pub mod metrics;

@@ -1,10 +1,12 @@
 //! The command line: subcommands, options and their help.
 
+mod bake;
 mod lab;
 pub mod values;
 
 use std::path::PathBuf;
 
+pub use bake::{BakeArgs, CriterionArg};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 pub use lab::{LabArgs, SweepArgs, TuneArgs};
 
@@ -47,6 +49,8 @@ pub enum Command {
     Sweep(SweepArgs),
     /// Find the best setting within a time, or the fastest within an error
     Tune(TuneArgs),
+    /// Trace indirect light over a day beforehand, for the pipeline `precomputed`
+    Bake(BakeArgs),
     /// List the adapters (GPUs and software) of this machine
     Adapters(AdaptersArgs),
 }

@@ -89,6 +89,27 @@ pub fn error(text: &str) -> Result<f64, String> {
     }
 }
 
+/// `--interval 5min`: a time above zero in seconds; s, min or h.
+pub fn duration(text: &str) -> Result<f64, String> {
+    let expected = "expected a time above 0, for example `90s`, `5min` or `24h`";
+    let text = text.trim();
+    let split = text.find(|c: char| c.is_alphabetic()).ok_or(expected)?;
+    let value: f64 = text[..split].trim().parse().map_err(|_| expected.to_owned())?;
+    let seconds = match &text[split..] {
+        "s" => value,
+        "min" => 60.0 * value,
+        "h" => 3600.0 * value,
+        _ => return Err(expected.to_owned()),
+    };
+    if seconds.is_finite() && seconds > 0.0 { Ok(seconds) } else { Err(expected.to_owned()) }
+}
+
+/// `--variance 0.986`: above 0, at most 1.
+pub fn share_of_one(text: &str) -> Result<f64, String> {
+    let found = text.trim().parse::<f64>().ok().filter(|value| *value > 0.0 && *value <= 1.0);
+    found.ok_or_else(|| "expected a share above 0, at most 1, for example `0.986`".to_owned())
+}
+
 /// A finite number.
 pub fn finite(text: &str) -> Result<f32, String> {
     match text.trim().parse::<f32>() {
@@ -151,6 +172,15 @@ mod tests {
             assert!(milliseconds(wrong).is_err(), "{wrong}");
         }
         assert!(error("0.1") == Ok(0.1) && error("-0.1").is_err() && error("NaN").is_err());
+    }
+
+    #[test]
+    fn durations() {
+        assert_eq!((duration("90s"), duration("5 min"), duration("24h")), (Ok(90.0), Ok(300.0), Ok(86_400.0)));
+        for wrong in ["5", "0min", "-1h", "min", "5 minutes", "1e999s", ""] {
+            assert!(duration(wrong).is_err(), "{wrong}");
+        }
+        assert!(share_of_one("1") == Ok(1.0) && share_of_one("0").is_err() && share_of_one("1.1").is_err() && share_of_one("x").is_err());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! One module a subcommand, and what they share.
 
 pub mod adapters;
+pub mod bake;
 pub mod check;
 pub mod compare;
 pub mod explain;
@@ -45,6 +46,7 @@ pub fn run(cli: &Cli) -> Result<(), Fault> {
         Command::Compare(args) => compare::run(args),
         Command::Sweep(args) => sweep::run(cli, args),
         Command::Tune(args) => tune::run(cli, args),
+        Command::Bake(args) => bake::run(cli, args),
         Command::Adapters(args) => adapters::run(args),
     }
 }
