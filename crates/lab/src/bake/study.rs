@@ -202,7 +202,8 @@ fn intervals(period_s: f64, day: &Day) -> Result<Table, BakeError> {
     let count = day.keys.len();
     let mut rows = Vec::new();
     // Of uniform schedules: mean and largest FLIP with the lit frames that they take.
-    let (mut by_mean, mut by_largest): (Vec<(f64, f64)>, Vec<(f64, f64)>) = (Vec::new(), Vec::new());
+    let mut by_mean: Vec<(f64, f64)> = Vec::new();
+    let mut by_largest: Vec<(f64, f64)> = Vec::new();
     let mut row = |what: String, keys: &[usize], errors: (f64, f64), saved: [String; 2]| {
         let [mean, largest] = saved;
         let cells =
