@@ -7,7 +7,7 @@
 
 #import common::bvh::{RAY_OFFSET, visible}
 #import common::cluster::{Cluster, CLUSTER_ACTIVE}
-#import common::cssm::{Region, depth_range, fetch, region, series, series_value, slabs_of}
+#import common::cssm::{depth_range, fetch, region, series, series_value, slabs_of}
 #import common::scene::SceneInfo
 #import common::octahedral::unpack_unit
 #import common::paraboloid::{basis, paraboloid_project, paraboloid_unproject, paraboloid_scale, atlas_origin}
@@ -150,6 +150,9 @@ fn cssm_visibility(r: Receiver) -> f32 {
     let search_angle = params.pcss_search * r.light_angle;
     let search = region(r.map, r.texel, 2.0 * search_angle * r.texels_per_angle, size, maps_per_row);
     var d = own - margin - slope * search_angle;
+    if d <= 0.0 {
+        return 1.0; // nearer than the series resolves
+    }
     let free = 0.5 + series(cssm, linear_sampler, search, 0u, atlas_height, params.terms, d);
     let depth = fetch(cssm, linear_sampler, search, 2u * slabs, atlas_height).x;
     let free_depth = 0.5 * depth + series(cssm, linear_sampler, search, slabs, atlas_height, params.terms, d);
