@@ -1,5 +1,5 @@
 //! Every pipeline under every combination of its options: each is planned, or refused with a reason; and of what is planned so many are
-//! rendered that every two options meet, and every number of every resource is looked at. Nothing here names a pipeline or an option.
+//! rendered that every two options meet, and every number that a node writes is looked at. Nothing here names a pipeline or an option.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -8,14 +8,13 @@ use std::{
     time::Instant,
 };
 
-use manylight_gpu::{ReadError, Subresource};
 use manylight_graph::{
     condition::{Condition, ConditionKind},
     library::Library,
     pipeline::ArgumentValue,
-    plan::{Plan, Target},
+    plan::Plan,
     registry::Direction,
-    value::{Format, ParamKind, ResourceDesc, Value},
+    value::{ParamKind, Value},
 };
 use manylight_passes::{Documents, Renderer, SceneSource, Settings, load_registry, plan_input};
 use manylight_scene::Scene;
@@ -41,9 +40,9 @@ const MOST_TOLD: usize = 6;
 
 /// A parameter and the values that it takes.
 #[derive(Debug, Clone)]
-struct Factor {
-    name: String,
-    values: Vec<String>,
+pub struct Factor {
+    pub name: String,
+    pub values: Vec<String>,
 }
 
 /// An index of a value by factor.
@@ -63,11 +62,11 @@ impl Chance {
 }
 
 /// A pipeline with the scenes that it is tried on.
-struct Subject<'a> {
-    documents: &'a Documents,
+pub struct Subject<'a> {
+    pub documents: &'a Documents,
     scenes: &'a [(SceneSource, Scene)],
     /// Choices and switches that change what is computed.
-    options: Vec<Factor>,
+    pub options: Vec<Factor>,
     /// Those that only choose what is shown.
     views: Vec<Factor>,
     /// Numbers, small ones first.
@@ -75,7 +74,7 @@ struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    fn new(documents: &'a Documents, scenes: &'a [(SceneSource, Scene)]) -> Self {
+    pub fn new(documents: &'a Documents, scenes: &'a [(SceneSource, Scene)]) -> Self {
         let pipeline = documents.pipeline();
         let preset = |name: &str| pipeline.set.get(name).map(|preset| preset.value.to_string());
         let (mut options, mut views, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
@@ -101,7 +100,7 @@ impl<'a> Subject<'a> {
     }
 
     /// Numbers as they are first listed.
-    fn small(&self) -> Vec<(String, String)> {
+    pub fn small(&self) -> Vec<(String, String)> {
         self.numbers.iter().map(|factor| (factor.name.clone(), factor.values[0].clone())).collect()
     }
 
@@ -113,7 +112,7 @@ impl<'a> Subject<'a> {
     }
 
     /// The plan; nothing where it is refused with a reason; else the faults.
-    fn plan(&self, settings: &Settings, scene: &Scene) -> Result<Option<Plan>, String> {
+    pub fn plan(&self, settings: &Settings, scene: &Scene) -> Result<Option<Plan>, String> {
         let input = plan_input(settings, scene);
         let faults = match self.documents.plan(&input) {
             Ok(plan) => return Ok(Some(plan)),
@@ -231,16 +230,15 @@ impl<'a> Subject<'a> {
     /// Renders a row on a scene and looks at everything; `None` where the numbers are refused.
     fn render(&self, row: &Row, (source, scene): &(SceneSource, Scene)) -> Result<Option<()>, String> {
         let mut settings = self.settings(&self.factors(), row);
-        let Some(plan) = self.plan(&settings, scene)? else { return Ok(None) };
-        settings.keep = written(&plan).into_iter().map(|(_, resource)| plan.resources[resource].name.clone()).collect();
+        if self.plan(&settings, scene)?.is_none() {
+            return Ok(None);
+        }
+        settings.debug.watch_numbers = true;
         let told = |what: String| format!("on {}, {}: {what}", scene.name, words(&settings));
         let mut renderer = Renderer::with(gpu(), self.documents.clone(), source.clone(), scene.clone(), settings.clone())
             .map_err(|e| told(e.to_string()))?;
         for frame in 0..FRAMES {
             renderer.render_frame(f64::from(frame) * STEP).map_err(|e| told(e.to_string()))?;
-            if let Some(bad) = scan(&renderer) {
-                return Err(told(format!("frame {frame}: {bad}")));
-            }
         }
         Ok(Some(()))
     }
@@ -250,7 +248,7 @@ fn switch() -> Vec<String> {
     ["false", "true"].map(str::to_owned).to_vec()
 }
 
-fn words(settings: &Settings) -> String {
+pub fn words(settings: &Settings) -> String {
     settings.set.iter().map(|(name, value)| format!("--set {name}={value}")).collect::<Vec<_>>().join(" ")
 }
 
@@ -294,88 +292,6 @@ fn some_clause(condition: &Condition, is: &dyn Fn(&ConditionKind) -> bool) -> bo
     }
 }
 
-/// Nodes and the resources that they write, in the order of execution.
-fn written(plan: &Plan) -> Vec<(usize, usize)> {
-    let outputs = |node: usize| {
-        let of = &plan.nodes[node];
-        let output = move |(port, target): &(String, Target)| match target {
-            Target::Resource(ix) if of.decl.ports.get(port).is_some_and(|p| p.direction == Direction::Output) => Some((node, *ix)),
-            _ => None,
-        };
-        of.bindings.iter().filter_map(output)
-    };
-    (0..plan.nodes.len()).flat_map(outputs).collect()
-}
-
-/// The first number, in the order of execution, that is none, is infinite, or is negative radiance.
-fn scan(renderer: &Renderer) -> Option<String> {
-    let plan = renderer.plan();
-    written(plan).into_iter().find_map(|(node, resource)| {
-        let resource = &plan.resources[resource];
-        let bad = match &resource.desc {
-            ResourceDesc::Texture { .. } => bad_texel(renderer, &resource.name, &resource.desc),
-            ResourceDesc::Buffer { element, .. } => bad_element(renderer, &resource.name, element),
-            ResourceDesc::Uniform { .. } => None,
-        }?;
-        let node = &plan.nodes[node];
-        Some(format!("node `{}` ({}) writes `{}`: {bad}", node.id, node.decl.name, resource.name))
-    })
-}
-
-/// Whether a resource holds radiance, which its documentation says.
-fn is_radiance(renderer: &Renderer, name: &str) -> bool {
-    let doc = renderer.pipeline().resources.get(name).map_or("", |resource| resource.doc.as_str());
-    doc.split(|c: char| !c.is_alphabetic()).any(|word| word == "radiance")
-}
-
-fn bad_texel(renderer: &Renderer, name: &str, desc: &ResourceDesc) -> Option<String> {
-    let ResourceDesc::Texture { format, mips, layers, .. } = desc else { return None };
-    if matches!(format, Format::R32Uint | Format::Rg32Uint | Format::Rgba32Uint) {
-        return None;
-    }
-    let radiance = is_radiance(renderer, name);
-    for layer in 0..*layers {
-        for mip in 0..*mips {
-            let part = Subresource { mip, layer };
-            let image = renderer.frame().read_image(renderer.gpu(), renderer.externals(), name, part).unwrap_or_else(|e| panic!("{e}"));
-            let channels = image.channels as usize;
-            // Alpha is something else.
-            let bad = |(i, v): &(usize, &f32)| !v.is_finite() || (radiance && i % channels < 3 && **v < 0.0);
-            if let Some((i, value)) = image.data.iter().enumerate().find(bad) {
-                let texel = i / channels;
-                let (x, y) = (texel % image.width as usize, texel / image.width as usize);
-                return Some(format!("texel ({x}, {y}) of level {mip}, layer {layer}, channel {} is {value}", i % channels));
-            }
-        }
-    }
-    None
-}
-
-fn bad_element(renderer: &Renderer, name: &str, element: &str) -> Option<String> {
-    match renderer.read_json(name) {
-        Ok(json) => json.as_array()?.iter().enumerate().find_map(|(i, value)| bad_number(value).map(|bad| format!("element {i}{bad}"))),
-        // A plain type has no fields: a structure's name is always known.
-        Err(ReadError::Layout { .. }) => {
-            let floats = element == "f32" || (element.starts_with("vec") && element.ends_with('f'));
-            let bytes = renderer.frame().read_bytes(renderer.gpu(), renderer.externals(), name).unwrap_or_else(|e| panic!("{e}"));
-            let mut numbers = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-            let at = numbers.position(|v| !v.is_finite()).filter(|_| floats)?;
-            Some(format!("number {at} is none or infinite"))
-        }
-        Err(e) => panic!("{e}"),
-    }
-}
-
-/// The place and the value of the first number that JSON lacks.
-fn bad_number(value: &serde_json::Value) -> Option<String> {
-    match value {
-        serde_json::Value::String(text) => Some(format!(" is {text}")),
-        serde_json::Value::Array(list) => list.iter().enumerate().find_map(|(i, v)| bad_number(v).map(|bad| format!("[{i}]{bad}"))),
-        serde_json::Value::Object(fields) => fields.iter().find_map(|(name, v)| bad_number(v).map(|bad| format!(".{name}{bad}"))),
-        _ => None,
-    }
-}
-
 /// The Cornell box, and a room without a spot light: a point light, a sun, and a block that turns.
 fn scenes(folder: &Path) -> Vec<(SceneSource, Scene)> {
     let asset = |name: &str| root().join("assets").join(name).to_string_lossy().replace('\\', "/");
@@ -414,6 +330,18 @@ fn stages(documents: &Documents) -> Option<Vec<String>> {
     (!adds).then(|| stages.iter().map(|source| source.name.clone()).collect())
 }
 
+/// The pipelines in `pipelines/`, without stages and such, whatever there is.
+pub fn documents_of_all_pipelines() -> Vec<(String, Documents)> {
+    let library = Library::new(Some(root()), Vec::new());
+    let (registry, found) = load_registry(&library);
+    let part = |path: &String| path["pipelines/".len()..].contains('/');
+    let load = |path: String| {
+        let documents = Documents::with(library.clone(), registry.clone(), found.clone(), Path::new(&path));
+        (path, documents.unwrap_or_else(|faults| panic!("{}", faults.render())))
+    };
+    library.list("pipelines", "ron").into_iter().filter(|path| !part(path)).map(load).collect()
+}
+
 /// Plans and renders a pipeline in all ways; returns a line for people, and the faults.
 fn try_all(subject: &Subject<'_>, most: usize, seed: u64) -> (String, Vec<String>) {
     let (mut chance, mut faults, start) = (Chance(seed), Vec::new(), Instant::now());
@@ -446,14 +374,9 @@ fn try_all(subject: &Subject<'_>, most: usize, seed: u64) -> (String, Vec<String
 fn every_combination_of_options_renders_finite_numbers_or_is_refused_with_a_reason() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let scenes = scenes(folder.path());
-    let library = Library::new(Some(root()), Vec::new());
-    let (registry, found) = load_registry(&library);
-    let part = |path: &String| path["pipelines/".len()..].contains('/');
     let mut all: BTreeMap<String, Vec<String>> = BTreeMap::new();
     let mut seen = BTreeSet::new();
-    for path in library.list("pipelines", "ron").into_iter().filter(|path| !part(path)) {
-        let documents = Documents::with(library.clone(), registry.clone(), found.clone(), Path::new(&path));
-        let documents = documents.unwrap_or_else(|faults| panic!("{}", faults.render()));
+    for (path, documents) in documents_of_all_pipelines() {
         let again = stages(&documents).is_some_and(|stages| !seen.insert(stages));
         let (line, faults) = try_all(&Subject::new(&documents, &scenes), if again { MOST_AGAIN } else { MOST_PLANNED }, 7);
         println!("{path}: {line}");
@@ -475,7 +398,7 @@ fn what_is_planted_in_a_shader_is_found_at_its_node() {
             "direct": Texture(format: Rgba32Float, doc: "W/(m² sr)"),
             "indirect": Texture(format: Rgba32Float, doc: "W/(m² sr)"),
         },
-        outputs: { "composed": Texture(format: Rgba32Float, doc: "W/(m² sr)") },
+        outputs: { "composed": Texture(format: Rgba32Float, at_least: 0.0, doc: "W/(m² sr)") },
         steps: [(entry: "compose", over: Texels("composed"))],
     )"#;
     const SHADER: &str = "
@@ -492,9 +415,9 @@ fn what_is_planted_in_a_shader_is_found_at_its_node() {
             textureStore(composed, id.xy, vec4f(both + PLANTED, 1.0));
         }";
     let planted = [
-        ("1e-9 / dot(distance, distance)", "inf"),
-        ("sqrt(dot(distance, distance) - 1e-9)", "NaN"),
-        ("select(0.0, -1e9, all(distance == vec2f(0.0)))", "-10"),
+        ("1e-9 / dot(distance, distance)", "infinite, and so are 2 numbers after it"),
+        ("sqrt(dot(distance, distance) - 1e-9)", "NaN, and so are 2 numbers after it"),
+        ("select(0.0, -1e9, all(distance == vec2f(0.0)))", "less than 0, and so are 2 numbers after it"),
     ];
     for (expression, value) in planted {
         let told = tell(DECLARATION, &SHADER.replace("PLANTED", expression));

@@ -16,6 +16,7 @@ use crate::{
     frame::{Bindings, Frame, Node, Pass, check_external, entry_of},
     host::HostNodes,
     limits::check_node,
+    numbers::Numbers,
     params,
     pipeline_cache::LayoutKey,
     poison::{Poison, fills},
@@ -30,13 +31,15 @@ use crate::{
 pub struct BuildOptions {
     /// Fill transient and kept resources with NaN before their first use (`Debug::poison`).
     pub poison: bool,
+    /// Look at every number that a node writes, right after it (`Debug::watch_numbers`).
+    pub watch_numbers: bool,
     /// Measure GPU times where the device can.
     pub timestamps: bool,
 }
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self { poison: false, timestamps: true }
+        Self { poison: false, watch_numbers: false, timestamps: true }
     }
 }
 
@@ -108,6 +111,7 @@ impl Frame {
             externals: used_externals(plan, externals),
             host_bytes: host_bytes(plan, &host_outputs),
             poison: None,
+            numbers: None,
             timer: Timer::new(gpu, std::iter::empty(), false),
             serial: previous.is_some_and(|f| f.serial),
             index: previous.map_or(0, |f| f.index),
@@ -121,6 +125,9 @@ impl Frame {
         b.done(())?;
         if options.poison {
             frame.add_poison(gpu)?;
+        }
+        if options.watch_numbers {
+            frame.numbers = Some(Numbers::new(gpu, plan, &frame.resources)?);
         }
         frame.rehearse(gpu)?;
         let names = plan.nodes.iter().zip(&frame.nodes);

@@ -11,10 +11,11 @@ use manylight_graph::{
 use crate::{
     bind::{Finder, Groups, Own, StepLayout},
     device::Gpu,
-    error::{Fault, RunError},
+    error::{Fault, ReadError, RunError},
     externals::{Externals, write_padded},
     format::describe,
     host::{HostBytes, HostContext, HostData, SharedHost},
+    numbers::{BadNumbers, Numbers},
     poison::{Fill, Poison},
     pool::{Memory, Place, Resource},
     record::{compute, draw},
@@ -31,6 +32,7 @@ pub struct Frame {
     pub(crate) externals: Vec<UsedExternal>,
     pub(crate) host_bytes: BTreeMap<ResourceIx, HostBytes>,
     pub(crate) poison: Option<Poison>,
+    pub(crate) numbers: Option<Numbers>,
     pub(crate) timer: Timer,
     /// Submit and wait node by node.
     pub(crate) serial: bool,
@@ -138,6 +140,15 @@ impl Frame {
         self.timer.latest()
     }
 
+    /// Numbers of the latest frame that are NaN, infinite or beyond what a port promises, in the order of execution. None where
+    /// [`BuildOptions::watch_numbers`](crate::BuildOptions::watch_numbers) is off. Waits for the GPU.
+    ///
+    /// # Errors
+    /// The device is lost.
+    pub fn bad_numbers(&self, gpu: &Gpu) -> Result<Vec<BadNumbers>, ReadError> {
+        self.numbers.as_ref().map_or(Ok(Vec::new()), |numbers| numbers.found(gpu, &self.plan))
+    }
+
     /// Runs the host nodes whose inputs changed, records the frame and submits it. Never waits for the GPU.
     pub fn record_and_submit(&mut self, gpu: &Gpu, externals: &Externals, data: HostData<'_>) -> Result<(), RunError> {
         if let Some(reason) = gpu.lost() {
@@ -178,8 +189,13 @@ impl Frame {
         let parity = self.parity();
         let (mut cpu_ns, mut gpu_ns) = (0, 0);
         gpu.wait();
+        if let Some(numbers) = &self.numbers {
+            let mut encoder = gpu.device().create_command_encoder(&FRAME_ENCODER);
+            numbers.begin(&mut encoder);
+            gpu.queue().submit([encoder.finish()]);
+        }
         for ix in 0..self.nodes.len() {
-            if self.nodes[ix].passes.is_empty() {
+            if !self.has_gpu_work(ix) {
                 continue;
             }
             let start = Instant::now();
@@ -205,19 +221,27 @@ impl Frame {
         (self.index.wrapping_sub(1) & 1) as usize
     }
 
+    /// Whether a node has passes, or wrote on the host what is looked at on the GPU.
+    fn has_gpu_work(&self, ix: usize) -> bool {
+        !self.nodes[ix].passes.is_empty() || self.numbers.as_ref().is_some_and(|numbers| numbers.looks_at(ix))
+    }
+
     /// Records all nodes.
     pub(crate) fn encode(&mut self, encoder: &mut wgpu::CommandEncoder, parity: usize) {
+        if let Some(numbers) = &self.numbers {
+            numbers.begin(encoder);
+        }
         for ix in 0..self.nodes.len() {
             self.encode_node(encoder, ix, parity);
         }
     }
 
     fn encode_node(&mut self, encoder: &mut wgpu::CommandEncoder, ix: usize, parity: usize) {
-        let Self { plan, nodes, timer, poison, .. } = self;
-        let (node, planned) = (&nodes[ix], &plan.nodes[ix]);
-        if node.passes.is_empty() {
+        if !self.has_gpu_work(ix) {
             return;
         }
+        let Self { plan, nodes, timer, poison, numbers, .. } = self;
+        let (node, planned) = (&nodes[ix], &plan.nodes[ix]);
         let start = Instant::now();
         let id = planned.id.as_str();
         let _span = tracing::info_span!("node", node = id, stage = planned.stage.as_str()).entered();
@@ -227,7 +251,7 @@ impl Frame {
             }
         }
         let span = timer.span(ix);
-        let last = node.passes.len() - 1;
+        let last = node.passes.len().saturating_sub(1);
         for (i, pass) in node.passes.iter().enumerate() {
             let stamps = span.filter(|_| i == 0 || i == last);
             let stamps = stamps.map(|(set, begin, end)| (set, (i == 0).then_some(begin), (i == last).then_some(end)));
@@ -235,6 +259,11 @@ impl Frame {
                 Pass::Compute(steps) => compute(encoder, id, steps, parity, stamps),
                 Pass::Draw(step) => draw(encoder, id, step, parity, stamps),
             }
+        }
+        if let Some(numbers) = numbers
+            && numbers.looks_at(ix)
+        {
+            numbers.scan(encoder, ix, parity);
         }
         timer.set_cpu(ix, nanoseconds(start));
     }

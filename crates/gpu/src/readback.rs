@@ -95,7 +95,7 @@ impl Frame {
 
 /// The layouts of a shader that knows `element`; one that binds the resource is preferred, for names may stand for different
 /// structures in different shaders.
-fn layouts_for<'a>(plan: &'a Plan, name: &str, element: &str) -> Option<&'a BTreeMap<String, Layout>> {
+pub(crate) fn layouts_for<'a>(plan: &'a Plan, name: &str, element: &str) -> Option<&'a BTreeMap<String, Layout>> {
     let resource = plan.resource(name);
     let knows = plan.nodes.iter().filter_map(|node| {
         let layouts = &node.decl.shader.as_ref()?.layouts;

@@ -8,6 +8,7 @@ mod formats;
 mod history;
 mod host;
 mod mips;
+mod numbers;
 mod params;
 mod poison;
 mod support;

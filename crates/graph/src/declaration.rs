@@ -96,7 +96,8 @@ fn read_node(reader: &mut Reader, tree: &Tree, host: bool) -> Option<Declaration
 fn read_ports(reader: &mut Reader, tree: &Tree, direction: Direction, ports: &mut IndexMap<String, Port>) {
     for (name, tree) in reader.map(tree, "ports") {
         check_identifier(reader, &name, "port");
-        let Some((kind, optional, doc)) = read_port(reader, tree) else { continue };
+        let Some(port) = read_port(reader, tree, direction, name.span.clone()) else { continue };
+        let kind = &port.kind;
         if direction == Direction::Output && matches!(kind, PortKind::Texture { format: None, .. }) {
             reader.error(&head(tree), "an output texture needs a format", "add `format: …`");
             continue;
@@ -113,13 +114,13 @@ fn read_ports(reader: &mut Reader, tree: &Tree, direction: Direction, ports: &mu
             );
             continue;
         }
-        ports.insert(name.text, Port { direction, kind, optional, doc, span: name.span });
+        ports.insert(name.text, port);
     }
 }
 
 const PORT_KINDS: &[&str] = &["Texture", "Buffer", "Uniform"];
 
-fn read_port(reader: &mut Reader, tree: &Tree) -> Option<(PortKind, bool, String)> {
+fn read_port(reader: &mut Reader, tree: &Tree, direction: Direction, span: Span) -> Option<Port> {
     let kind_name = match &tree.kind {
         Kind::Record(Some(n), _) | Kind::Tuple(Some(n), _) => n.text.clone(),
         Kind::Name(n) => n.clone(),
@@ -129,8 +130,8 @@ fn read_port(reader: &mut Reader, tree: &Tree) -> Option<(PortKind, bool, String
         }
     };
     let shape = match kind_name.as_str() {
-        "Texture" => Shape { what: "Texture", required: &["doc"], optional: &["format", "array", "optional"] },
-        "Buffer" => Shape { what: "Buffer", required: &["of", "doc"], optional: &["optional"] },
+        "Texture" => Shape { what: "Texture", required: &["doc"], optional: &["format", "array", "optional", "at_least", "at_most"] },
+        "Buffer" => Shape { what: "Buffer", required: &["of", "doc"], optional: &["optional", "at_least", "at_most"] },
         "Uniform" => Shape { what: "Uniform", required: &["of", "doc"], optional: &["optional"] },
         other => {
             reader.error(&head(tree), format!("unknown kind of port `{other}`"), suggest(other, PORT_KINDS.iter().copied()));
@@ -151,7 +152,14 @@ fn read_port(reader: &mut Reader, tree: &Tree) -> Option<(PortKind, bool, String
         "Buffer" => PortKind::Buffer { of: read_type(reader, fields.get("of")?)? },
         _ => PortKind::Uniform { of: read_type(reader, fields.get("of")?)? },
     };
-    Some((kind, optional, doc))
+    let [at_least, at_most] = ["at_least", "at_most"].map(|name| {
+        let tree = fields.get(name)?;
+        if direction == Direction::Input {
+            reader.error(&tree.range, format!("`{name}` is a promise of who writes"), "give it to the output of the other node");
+        }
+        reader.float(tree, "a number")
+    });
+    Some(Port { direction, kind, optional, at_least, at_most, doc, span })
 }
 
 /// A WGSL type by name; long spellings of vectors become short ones.

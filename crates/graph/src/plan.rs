@@ -33,6 +33,8 @@ pub struct Debug {
     pub no_reuse: bool,
     /// Fill transient resources with NaN patterns when they are acquired.
     pub poison: bool,
+    /// Look at every number that a node writes, right after it.
+    pub watch_numbers: bool,
     /// Choose another legal order, by seed.
     pub shuffle: Option<u64>,
 }

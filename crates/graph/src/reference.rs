@@ -8,7 +8,7 @@ use crate::{
     diagnostics::Diagnostic,
     draw::value,
     fit::describe,
-    registry::{Direction, NodeDecl, Registry},
+    registry::{Direction, NodeDecl, Port, Registry},
     render::suggest,
     value::ParamKind,
 };
@@ -47,7 +47,7 @@ pub fn node_text(node: &NodeDecl) -> String {
         let _ = writeln!(out, "\n{title}:");
         for (name, port) in ports {
             let optional = if port.optional { ", optional" } else { "" };
-            let _ = writeln!(out, "  {name:width$}  {}{optional}. {}", describe(&port.kind), port.doc);
+            let _ = writeln!(out, "  {name:width$}  {}{optional}. {}", what(port), port.doc);
         }
     }
     if !node.params.is_empty() {
@@ -62,6 +62,13 @@ pub fn node_text(node: &NodeDecl) -> String {
     }
     let _ = writeln!(out, "\n{}", made_of(node));
     out
+}
+
+/// The kind of a port and what its numbers promise.
+fn what(port: &Port) -> String {
+    let bounds = [("at least", port.at_least), ("at most", port.at_most)]
+        .map(|(word, bound)| bound.map(|b| format!(", {word} {b}")).unwrap_or_default());
+    describe(&port.kind) + &bounds.concat()
 }
 
 /// A page with every node, by stage, and the scene's data.
@@ -97,7 +104,7 @@ pub fn node_markdown(node: &NodeDecl) -> String {
                 (Direction::Output, false) => "out",
                 (Direction::Output, true) => "out, optional",
             };
-            let _ = writeln!(out, "| `{name}` ({way}) | {} | {} |", cell(&describe(&port.kind)), cell(&port.doc));
+            let _ = writeln!(out, "| `{name}` ({way}) | {} | {} |", cell(&what(port)), cell(&port.doc));
         }
     }
     if !node.params.is_empty() {
@@ -127,9 +134,7 @@ pub fn json(registry: &Registry) -> Json {
 pub fn node_json(node: &NodeDecl) -> Json {
     let ports = |direction: Direction| -> Json {
         let ports = node.ports.iter().filter(|(_, p)| p.direction == direction);
-        Json::Object(
-            ports.map(|(name, p)| (name.clone(), json!({ "is": describe(&p.kind), "optional": p.optional, "doc": p.doc }))).collect(),
-        )
+        Json::Object(ports.map(|(name, p)| (name.clone(), json!({ "is": what(p), "optional": p.optional, "doc": p.doc }))).collect())
     };
     let params = node.params.iter().map(|(name, param)| {
         let mut object = json!({ "type": param.kind.type_name(), "default": value(&param.kind.default_value()), "doc": param.doc });

@@ -52,6 +52,10 @@ pub struct Port {
     pub kind: PortKind,
     /// May be left unconnected or connected to a resource whose producer is off; an empty placeholder is bound then.
     pub optional: bool,
+    /// Of an output: no number written is less. Told by `Debug::watch_numbers` where it does not hold.
+    pub at_least: Option<f64>,
+    /// Of an output: no number written is greater.
+    pub at_most: Option<f64>,
     /// What it is: units, space, meaning.
     pub doc: String,
     /// Where the port is declared.

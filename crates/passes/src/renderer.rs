@@ -7,8 +7,8 @@ use std::{
 };
 
 use manylight_gpu::{
-    BuildOptions, BuildReport, Externals, Fault, Frame, FrameTimings, Gpu, HostData, HostNodes, Image, MemoryReport, ReadError, RunError,
-    Subresource, WatchSet,
+    BadNumbers, BuildOptions, BuildReport, Externals, Fault, Frame, FrameTimings, Gpu, HostData, HostNodes, Image, MemoryReport, ReadError,
+    RunError, Subresource, WatchSet,
 };
 use manylight_graph::{
     diagnostics::{Diagnostic, Diagnostics},
@@ -53,6 +53,42 @@ pub enum RenderError {
     /// The frame could not be run.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// The frame is there and can be read, but numbers in it are bad (`Debug::watch_numbers`).
+    #[error("{}", bad_numbers(*.frame, .found).render().trim_end())]
+    Numbers {
+        /// Which frame, counted from the first.
+        frame: u32,
+        /// What was found, in the order of execution: what comes first is likely the cause of the rest.
+        found: Vec<BadNumbers>,
+    },
+}
+
+impl RenderError {
+    /// As diagnostics for people.
+    pub fn diagnostics(self) -> Diagnostics {
+        match self {
+            Self::Documents(diagnostics) => diagnostics,
+            Self::Run(error) => Diagnostics(vec![Diagnostic::error_nowhere(error.to_string())]),
+            Self::Numbers { frame, found } => bad_numbers(frame, &found),
+        }
+    }
+}
+
+/// Findings that are told of a frame.
+const MOST_TOLD: usize = 4;
+
+fn bad_numbers(frame: u32, found: &[BadNumbers]) -> Diagnostics {
+    let mut all: Vec<Diagnostic> =
+        found.iter().take(MOST_TOLD).map(|bad| Diagnostic::error_nowhere(format!("frame {frame}: {bad}"))).collect();
+    let more = match found.len().saturating_sub(MOST_TOLD) {
+        0 => String::new(),
+        more => format!("; so do {more} resources or levels after it"),
+    };
+    if let Some(last) = all.pop() {
+        let help = format!("the first of these is likely the cause of the rest{more}; `--dump RESOURCE=FILE` writes a resource whole");
+        all.push(last.help(help));
+    }
+    Diagnostics(all)
 }
 
 impl From<Diagnostics> for RenderError {
@@ -211,7 +247,8 @@ impl Renderer {
     /// change of a parameter.
     ///
     /// # Errors
-    /// A host node failed, the scene outgrew the device, or the device is lost.
+    /// A host node failed, the scene outgrew the device, or the device is lost. With [`Debug::watch_numbers`] also that the frame has bad numbers;
+    /// for this alone it waits for the GPU.
     pub fn render_frame(&mut self, time: f64) -> Result<(), RenderError> {
         let frame = gpu_data::Frame {
             index: (self.frame.index() - self.first.min(self.frame.index())) as u32,
@@ -228,6 +265,12 @@ impl Renderer {
         let data = HostData::new(&self.scene.host, self.scene.stamp());
         self.frame.record_and_submit(&self.gpu, &self.scene.externals, data)?;
         self.last_time = Some(time);
+        if self.settings.debug.watch_numbers {
+            let found = self.frame.bad_numbers(&self.gpu).map_err(|e| RunError::Gpu(e.to_string()))?;
+            if !found.is_empty() {
+                return Err(RenderError::Numbers { frame: frame.index, found });
+            }
+        }
         Ok(())
     }
 
@@ -414,7 +457,7 @@ fn build(
     previous: Option<&Frame>,
     settings: &Settings,
 ) -> Result<(Frame, BuildReport), Diagnostics> {
-    let options = BuildOptions { poison: settings.debug.poison, ..Default::default() };
+    let options = BuildOptions { poison: settings.debug.poison, watch_numbers: settings.debug.watch_numbers, ..Default::default() };
     Frame::build(gpu, plan, &scene.externals, hosts, previous, options).map_err(|e| e.diagnostics())
 }
 

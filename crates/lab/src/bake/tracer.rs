@@ -199,7 +199,7 @@ impl From<manylight_passes::RenderError> for BakeError {
     fn from(error: manylight_passes::RenderError) -> Self {
         match error {
             manylight_passes::RenderError::Documents(diagnostics) => Self::Documents(diagnostics),
-            manylight_passes::RenderError::Run(error) => Self::Render(error.to_string()),
+            error => Self::Render(error.to_string()),
         }
     }
 }

@@ -54,7 +54,7 @@ impl From<RenderError> for SweepError {
     fn from(error: RenderError) -> Self {
         match error {
             RenderError::Documents(diagnostics) => Self::Documents(diagnostics),
-            RenderError::Run(error) => Self::Render(error.to_string()),
+            error => Self::Render(error.to_string()),
         }
     }
 }

@@ -87,6 +87,10 @@ pub struct DebugArgs {
     /// Fill transient resources with NaN patterns before their first use
     #[arg(long)]
     pub poison: bool,
+    /// Look at every number that a node writes, right after it: what is NaN, infinite or beyond what a port promises (negative radiance) is told
+    /// with its node and texel
+    #[arg(long)]
+    pub watch_numbers: bool,
     /// Run the nodes in another legal order, chosen by a seed
     #[arg(long, value_name = "SEED")]
     pub shuffle: Option<u64>,

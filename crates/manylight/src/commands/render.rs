@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use super::{
     of_file,
     outputs::Outputs,
-    session::{Session, of_render, settings, time_of},
+    session::{Session, bad_numbers, settings, time_of},
     stats,
 };
 use crate::{
@@ -34,13 +34,13 @@ pub fn run(cli: &Cli, args: &RenderArgs) -> Result<(), Fault> {
     let spinner = progress::spinner("compiling shaders");
     let mut renderer = session.renderer(&gpu, scene, settings)?;
     spinner.finish_and_clear();
-    let samples = frames(&mut renderer, args)?;
+    let (samples, bad_numbers) = frames(&mut renderer, args)?;
     outputs.write(&renderer)?;
     if let Some(file) = &args.stats {
         let stats = stats(&renderer, args, &samples)?;
         write_text(file, &format!("{stats:#}\n")).map_err(of_file)?;
     }
-    Ok(())
+    bad_numbers.map_or(Ok(()), Err)
 }
 
 fn check(args: &RenderArgs, outputs: &Outputs) -> Result<(), Fault> {
@@ -56,15 +56,22 @@ fn check(args: &RenderArgs, outputs: &Outputs) -> Result<(), Fault> {
     }
 }
 
-fn frames(renderer: &mut Renderer, args: &RenderArgs) -> Result<FrameSamples, Fault> {
-    let mut samples = FrameSamples::new(renderer.plan());
+/// Renders all frames, or until one has bad numbers.
+fn frames(renderer: &mut Renderer, args: &RenderArgs) -> Result<(FrameSamples, Option<Fault>), Fault> {
+    let (mut samples, mut found) = (FrameSamples::new(renderer.plan()), None);
     let bar = progress::bar(args.frames.into(), "rendering");
     // Where timestamps say nothing of single nodes, every other frame is measured node by node; the picture is the same.
     let serial = args.stats.is_some() && serial_by_default(renderer.gpu());
     for frame in 0..u64::from(args.frames) {
         let one_by_one = serial && frame % 2 == 1;
         renderer.measure_serially(one_by_one);
-        let (timings, wall_ms) = timed_frame(renderer, time_of(&args.frame, frame)).map_err(of_render)?;
+        let (timings, wall_ms) = match timed_frame(renderer, time_of(&args.frame, frame)) {
+            Ok(timed) => timed,
+            Err(error) => {
+                found = bad_numbers(Err(error))?;
+                break;
+            }
+        };
         if !one_by_one {
             samples.push_frame(timings, wall_ms);
         }
@@ -75,7 +82,7 @@ fn frames(renderer: &mut Renderer, args: &RenderArgs) -> Result<FrameSamples, Fa
     }
     renderer.measure_serially(false);
     bar.finish_and_clear();
-    Ok(samples)
+    Ok((samples, found))
 }
 
 fn stats(renderer: &Renderer, args: &RenderArgs, samples: &FrameSamples) -> Result<Value, Fault> {

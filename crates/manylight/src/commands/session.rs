@@ -85,7 +85,13 @@ fn baked(file: &Path) -> Result<Baked, Fault> {
 }
 
 fn debug(args: &DebugArgs) -> Debug {
-    Debug { no_culling: args.no_culling, no_reuse: args.no_reuse, poison: args.poison, shuffle: args.shuffle }
+    Debug {
+        no_culling: args.no_culling,
+        no_reuse: args.no_reuse,
+        poison: args.poison,
+        watch_numbers: args.watch_numbers,
+        shuffle: args.shuffle,
+    }
 }
 
 /// Scene time of a frame.
@@ -95,8 +101,14 @@ pub fn time_of(args: &FrameArgs, frame: u64) -> f64 {
 
 /// A render error as a fault of the input.
 pub fn of_render(error: RenderError) -> Fault {
-    match error {
-        RenderError::Documents(diagnostics) => Fault::Documents(diagnostics),
-        RenderError::Run(error) => Fault::Input(error.to_string()),
+    Fault::Documents(error.diagnostics())
+}
+
+/// Bad numbers of a frame, which is there all the same.
+pub fn bad_numbers(frame: Result<(), RenderError>) -> Result<Option<Fault>, Fault> {
+    match frame {
+        Ok(()) => Ok(None),
+        Err(error @ RenderError::Numbers { .. }) => Ok(Some(of_render(error))),
+        Err(error) => Err(of_render(error)),
     }
 }

@@ -14,7 +14,7 @@ use manylight::{
 use super::{
     note,
     outputs::Outputs,
-    session::{Session, of_render, settings, time_of},
+    session::{Session, bad_numbers, settings, time_of},
 };
 use crate::cli::{Cli, WatchArgs};
 
@@ -65,7 +65,10 @@ impl Watch<'_> {
 
     fn picture(&mut self, frames: u32) -> Result<(), Fault> {
         for _ in 0..frames {
-            self.renderer.render_frame(time_of(&self.args.frame, self.frame)).map_err(of_render)?;
+            let rendered = self.renderer.render_frame(time_of(&self.args.frame, self.frame));
+            if let Some(fault) = bad_numbers(rendered)? {
+                note(&fault.render());
+            }
             self.frame += 1;
         }
         self.outputs.write(&self.renderer)?;
