@@ -1,6 +1,8 @@
 // Rays against the hierarchy that the host builds (crate manylight-scene, module `bvh`; layouts are compared when a shader loads).
 // A node whose entry points reach `intersect` has the ports `bvh_nodes` and `bvh_triangles`. Cost: some tens of nodes a ray.
 
+#import common::scene::SceneInfo
+
 struct BvhNode {
     low: vec3f,
     first: u32, // triangle, or the first of two children
@@ -23,8 +25,12 @@ struct BvhTriangle {
 // Depth that a traversal's stack must hold; the host refuses deeper hierarchies.
 const BVH_STACK: u32 = 48u;
 
-// Rays start and end this share of the scene's diagonal away from surfaces: hides detail below that size from shadow rays.
-const RAY_OFFSET: f32 = 2e-5;
+// Rays start and end so far away from surfaces, in the scene's units: a share of its diagonal, which hides detail below that size from shadow rays;
+// in a scene far from the origin eight units in the last place of its coordinates, which is what positions on surfaces are known to.
+fn ray_offset(info: SceneInfo) -> f32 {
+    let farthest = max(abs(info.bounds_min), abs(info.bounds_max));
+    return max(2e-5 * info.diagonal, exp2(-20.0) * max(farthest.x, max(farthest.y, farthest.z)));
+}
 
 struct Ray {
     origin: vec3f,

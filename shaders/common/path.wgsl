@@ -6,7 +6,7 @@
 // What bounds it: three rays per path and bounce and one for each light, each some tens of nodes.
 
 #import common::scene::{Light, SceneInfo, Vertex, Triangle, Object, Material, NO_TEXTURE, LIGHT_DIRECTIONAL}
-#import common::bvh::{bvh_triangles, Ray, Hit, MISSED, RAY_OFFSET, make_ray, intersect, visible}
+#import common::bvh::{bvh_triangles, Ray, Hit, MISSED, ray_offset, make_ray, intersect, visible}
 #import common::radiometry::{PI, Arrival, light_at, max_component, lambert_blinn}
 #import common::random::{hash, hash3, unit_float, scrambled_sobol}
 #import common::paraboloid::basis
@@ -73,7 +73,7 @@ fn brdf(s: Surface, towards: vec3f) -> vec3f {
 }
 
 fn lift(s: Surface) -> vec3f {
-    return s.position + s.geometric * (RAY_OFFSET * scene_info.diagonal);
+    return s.position + s.geometric * ray_offset(scene_info);
 }
 
 // Whether nothing lies between a surface and a point that is off its own surface already.

@@ -5,7 +5,7 @@
 // adapter twice the time of pcss in a box of some tens of triangles, seven times in an atrium of 66,000). Mesa's software adapters end all loops of
 // an invocation after 65,535 rounds together, in silence: with exact visibility k / n² must stay below some 2000 there.
 
-#import common::bvh::{RAY_OFFSET, visible}
+#import common::bvh::{ray_offset, visible}
 #import common::cluster::{Cluster, CLUSTER_ACTIVE}
 #import common::cssm::{depth_range, fetch, region, series, series_value, slabs_of}
 #import common::scene::SceneInfo
@@ -181,7 +181,7 @@ fn light(@builtin(global_invocation_id) id: vec3u) {
         let normal = unpack_unit(textureLoad(split_normal, id.xy, 0).x);
         let tile = id.xy / (size / params.tiles);
         let least_distance = params.vpl_clamp * scene_info.diagonal;
-        let lift = RAY_OFFSET * scene_info.diagonal;
+        let lift = ray_offset(scene_info);
         for (var c = tile.y * params.tiles + tile.x; c < arrayLength(&clusters); c += params.tiles * params.tiles) {
             let cluster = clusters[c];
             if cluster.state != CLUSTER_ACTIVE || cluster.count == 0u {

@@ -31,6 +31,9 @@ struct Params {
 
 override lights_is_val: bool;
 
+// Luminance, W/m², below which the direction of light is lost in rounding.
+const LEAST_LIGHT: f32 = 1e-30;
+
 // Light that arrives at the back of a surface.
 struct Behind {
     irradiance: vec3f, // W/m²
@@ -72,7 +75,8 @@ fn negative_light(i: u32, count: u32) -> Cluster {
     let position = scene_camera.origin + distance * ray;
     let normal = unpack_unit(textureLoad(gbuffer_normal, pixel, 0).x);
     let behind = light_behind(position, normal);
-    if luminance(behind.irradiance) <= 0.0 {
+    let strength = luminance(behind.irradiance);
+    if strength < LEAST_LIGHT {
         return light;
     }
     // What the pixels of a sample cover, across the ray and on the surface.
@@ -81,7 +85,7 @@ fn negative_light(i: u32, count: u32) -> Cluster {
     light.count = 1u;
     light.position = position;
     light.area = solid_angle * distance * distance / max(-dot(normal, ray), MIN_COSINE);
-    light.normal = normalize(behind.way); // no two ways are opposite: all come from behind
+    light.normal = normalize(behind.way / strength); // no two ways are opposite: all come from behind
     light.flux = -params.negative_strength * light.area * behind.irradiance;
     return light;
 }

@@ -4,7 +4,7 @@
 // empty map behind everything. Directions below a caster's horizon have no map. Cost: six vertices a triangle and map, and the texels of their rectangles.
 
 #import common::cluster::{Cluster, CLUSTER_ACTIVE}
-#import common::bvh::RAY_OFFSET
+#import common::bvh::ray_offset
 #import common::paraboloid::{basis, paraboloid_unproject, atlas_origin, Rectangle, above_horizon}
 #import common::radiometry::PI
 #import common::scene::{Vertex, Triangle, Object, SceneInfo}
@@ -52,7 +52,7 @@ fn enclose(@builtin(vertex_index) index: u32, @builtin(instance_index) map: u32)
         let world_from_object = scene_objects[triangle.object].world_from_object;
         let frame = basis(caster.normal);
         // Off its own surface, which would shadow it.
-        let eye = caster.position + caster.normal * (RAY_OFFSET * scene_info.diagonal);
+        let eye = caster.position + caster.normal * ray_offset(scene_info);
         out.a = ((world_from_object * vec4f(scene_vertices[triangle.a].position, 1.0)).xyz - eye) * frame; // transpose × vector
         out.b = ((world_from_object * vec4f(scene_vertices[triangle.b].position, 1.0)).xyz - eye) * frame;
         out.c = ((world_from_object * vec4f(scene_vertices[triangle.c].position, 1.0)).xyz - eye) * frame;

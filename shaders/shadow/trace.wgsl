@@ -1,6 +1,6 @@
 // Paraboloid shadow maps by rays: the same maps as `shadow/rasterize`. Cost: a ray per texel above the horizon, some tens of nodes each.
 
-#import common::bvh::{RAY_OFFSET, MISSED, intersect, make_ray}
+#import common::bvh::{ray_offset, MISSED, intersect, make_ray}
 #import common::cluster::{Cluster, CLUSTER_ACTIVE}
 #import common::paraboloid::{basis, paraboloid_unproject}
 #import common::radiometry::PI
@@ -29,7 +29,7 @@ fn distance_along(map: u32, ray: vec3f) -> f32 {
     // Off its own surface, which would shadow it.
     let ignored = params.ignored_radius * sqrt(caster.area / PI);
     let direction = basis(caster.normal) * ray;
-    let origin = caster.position + caster.normal * (RAY_OFFSET * scene_info.diagonal) + direction * ignored;
+    let origin = caster.position + caster.normal * ray_offset(scene_info) + direction * ignored;
     let hit = intersect(make_ray(origin, direction), MISSED, false);
     return min((hit.t + ignored) / scene_info.diagonal, NOTHING);
 }
