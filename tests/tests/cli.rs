@@ -2,31 +2,9 @@
 
 use std::{fs, path::Path};
 
-use crate::support::{manylight, manylight_in, root};
+use crate::support::{copy_of_library, manylight, manylight_in};
 
 const SMALL: [&str; 4] = ["--size", "32x32", "--frames", "1"];
-
-/// A folder with a copy of `pipelines/` and `shaders/` to break.
-pub fn copy_of_library() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    for part in ["pipelines", "shaders", "assets"] {
-        copy(&root().join(part), &folder.path().join(part));
-    }
-    folder
-}
-
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).expect("a folder");
-    for entry in fs::read_dir(from).expect("a folder") {
-        let entry = entry.expect("an entry");
-        let target = to.join(entry.file_name());
-        if entry.file_type().expect("a type").is_dir() {
-            copy(&entry.path(), &target);
-        } else {
-            fs::copy(entry.path(), target).expect("a copy");
-        }
-    }
-}
 
 fn replace(file: &Path, from: &str, to: &str) {
     let text = fs::read_to_string(file).expect("a text");

@@ -12,14 +12,17 @@ use manylight_graph::{
     condition::{Condition, ConditionKind},
     library::Library,
     pipeline::ArgumentValue,
-    plan::Plan,
+    plan::{Debug, Plan},
     registry::Direction,
-    value::{ParamKind, Value},
+    value::ParamKind,
 };
 use manylight_passes::{Documents, Renderer, SceneSource, Settings, load_registry, plan_input};
 use manylight_scene::Scene;
 
-use crate::{renders::gpu, support::root};
+use crate::{
+    renders::{Job, gpu},
+    support::{project_with, root},
+};
 
 const SIZE: (u32, u32) = (24, 16);
 const FRAMES: u32 = 2;
@@ -420,51 +423,15 @@ fn what_is_planted_in_a_shader_is_found_at_its_node() {
         ("select(0.0, -1e9, all(distance == vec2f(0.0)))", "less than 0, and so are 2 numbers after it"),
     ];
     for (expression, value) in planted {
-        let told = tell(DECLARATION, &SHADER.replace("PLANTED", expression));
+        let project = project_with(&[
+            ("shaders/test/planted.ron", DECLARATION),
+            ("shaders/test/planted.wgsl", &SHADER.replace("PLANTED", expression)),
+            ("pipelines/planted.ron", "Pipeline(doc: \"x\", extends: \"acrsm.ron\", nodes: [(id: \"compose\", node: \"test/planted\")])"),
+        ]);
+        let debug = Debug { watch_numbers: true, ..Debug::default() };
+        let job = Job { root: project.path().to_owned(), pipeline: "planted".to_owned(), debug, ..Job::asset("cornell").small() };
+        let told = job.renderer().render_frame(0.0).expect_err("it has a fault").to_string();
         let place = "frame 0: node `compose` (test/planted) writes `composed`: texel (5, 3) of level 0, layer 0, channel 0 is";
-        assert!(told.contains("on cornell,") && told.contains(&format!("{place} {value}")), "{expression}: {told}");
-    }
-}
-
-/// What the scan says of `acrsm` as it is, on the Cornell box, with another node in the place of the one that adds direct and indirect light.
-fn tell(declaration: &str, shader: &str) -> String {
-    let folder = tempfile::tempdir().expect("temporary folder");
-    for part in ["shaders", "pipelines"] {
-        copy(&root().join(part), &folder.path().join(part));
-    }
-    let write = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        fs::create_dir_all(path.parent().expect("a folder")).expect("creatable");
-        fs::write(path, text).expect("writable");
-    };
-    write("shaders/test/planted.ron", declaration);
-    write("shaders/test/planted.wgsl", shader);
-    write("pipelines/planted.ron", "Pipeline(doc: \"x\", extends: \"acrsm.ron\", nodes: [(id: \"compose\", node: \"test/planted\")])");
-    let scenes = scenes(folder.path());
-    let documents = Documents::load(Library::new(Some(folder.path().to_owned()), Vec::new()), Path::new("planted"));
-    let documents = documents.unwrap_or_else(|faults| panic!("{}", faults.render()));
-    let subject = Subject::new(&documents, &scenes);
-    let usual = |factors: &[Factor], plan: &Plan| -> Row {
-        let value = |factor: &Factor| {
-            let (_, value) = plan.params.iter().find(|(name, _)| *name == factor.name).expect("a parameter");
-            let text = if let Value::Choice(option) = value { option.clone() } else { value.to_string() };
-            factor.values.iter().position(|v| *v == text).unwrap_or(0)
-        };
-        factors.iter().map(value).collect()
-    };
-    let plan = documents.plan(&plan_input(&Settings { size: SIZE, ..Settings::default() }, &scenes[0].1)).expect("it can be planned");
-    subject.render(&usual(&subject.factors(), &plan), &scenes[0]).expect_err("it has a fault")
-}
-
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).expect("creatable");
-    for entry in fs::read_dir(from).expect("readable") {
-        let entry = entry.expect("an entry");
-        let target = to.join(entry.file_name());
-        if entry.path().is_dir() {
-            copy(&entry.path(), &target);
-        } else {
-            fs::copy(entry.path(), target).expect("copied");
-        }
+        assert!(told.contains(&format!("{place} {value}")), "{expression}: {told}");
     }
 }

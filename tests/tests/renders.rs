@@ -19,6 +19,8 @@ pub fn gpu() -> &'static Gpu {
 
 /// What to render; the pipeline is `acrsm` unless said otherwise.
 pub struct Job {
+    /// Folder with `shaders/` and `pipelines/`.
+    pub root: PathBuf,
     pub pipeline: String,
     pub scene: PathBuf,
     pub size: (u32, u32),
@@ -39,6 +41,7 @@ impl Job {
     /// A scene by its path. 256² pixels, 24 frames: the clusters have settled then.
     pub fn scene(path: &Path) -> Self {
         Self {
+            root: root(),
             pipeline: root().join("pipelines/acrsm.ron").to_string_lossy().into_owned(),
             scene: path.to_owned(),
             size: (256, 256),
@@ -86,7 +89,7 @@ impl Job {
             seed: self.seed,
             baked: self.baked.clone(),
         };
-        let library = Library::new(Some(root()), Vec::new());
+        let library = Library::new(Some(self.root.clone()), Vec::new());
         Renderer::new(gpu(), library, &self.pipeline, SceneSource::file(&self.scene), settings).unwrap_or_else(|e| panic!("{e}"))
     }
 

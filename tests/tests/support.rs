@@ -1,6 +1,7 @@
 //! What the tests share: paths, the program, and how to run it.
 
 use std::{
+    fs,
     path::{Path, PathBuf},
     process::{Command, Output},
     sync::OnceLock,
@@ -15,6 +16,39 @@ pub fn root() -> PathBuf {
 pub fn shared() -> Option<PathBuf> {
     let folder = root().parent()?.join("shared");
     folder.join("reference").is_dir().then_some(folder)
+}
+
+/// A folder with a copy of `pipelines/`, `shaders/` and `assets/` to break.
+pub fn copy_of_library() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for part in ["pipelines", "shaders", "assets"] {
+        copy(&root().join(part), &folder.path().join(part));
+    }
+    folder
+}
+
+/// The same, with some files added or replaced.
+pub fn project_with(files: &[(&str, &str)]) -> tempfile::TempDir {
+    let folder = copy_of_library();
+    for (name, text) in files {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        fs::write(path, text).expect("written");
+    }
+    folder
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).expect("a folder");
+    for entry in fs::read_dir(from).expect("a folder") {
+        let entry = entry.expect("an entry");
+        let target = to.join(entry.file_name());
+        if entry.file_type().expect("a type").is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).expect("a copy");
+        }
+    }
 }
 
 /// The built program. Built here if the test runner has not done so.

@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use crate::{
-    cli::copy_of_library,
+    support::copy_of_library,
     support::{manylight_in, root},
 };
 
