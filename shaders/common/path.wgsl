@@ -26,6 +26,10 @@ const ROULETTE_FROM: u32 = 4u;
 // Survival is never likelier than this, so that a white scene's paths end.
 const MOST_SURVIVAL: f32 = 0.95;
 
+// Paths of one dispatch (declarations divide by it). Some adapters end all loops of an invocation after 65,535 rounds together, in silence
+// (Mesa's software rasterizer): four paths of many bounces through a deep hierarchy stay below.
+const PATHS_AT_ONCE: u32 = 4u;
+
 // A point of a surface as a ray meets it.
 struct Surface {
     position: vec3f,
@@ -289,4 +293,16 @@ fn gather(start: Surface, what: Gathered, known: vec3f) -> vec3f {
         }
     }
     return radiance;
+}
+
+// One path from a surface as a component of the light asks for it: with the direct light of the lights or without. W/(m² sr)
+fn light_of(x: Surface, with_direct: bool, what: Gathered) -> vec3f {
+    var radiance = vec3f(0.0);
+    if with_direct {
+        radiance = direct(x);
+    }
+    if !what.lights && !what.sky {
+        return radiance;
+    }
+    return gather(x, what, radiance);
 }

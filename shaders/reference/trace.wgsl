@@ -6,7 +6,7 @@
 #import common::bvh::{MISSED, make_ray, intersect}
 #import common::view::ray_direction
 #import common::random::hash3
-#import common::path::{BEFORE, Gathered, direct, gather, path_index, random_pair, start_paths, surface_at}
+#import common::path::{BEFORE, PATHS_AT_ONCE, Gathered, light_of, path_index, random_pair, start_paths, surface_at}
 #import common::sky::sky_radiance
 
 struct Params {
@@ -33,21 +33,10 @@ fn path(pixel: vec2u, size: vec2u) -> vec3f {
     if hit.t >= MISSED {
         return select(vec3f(0.0), sky_radiance(ray.direction), has_sky);
     }
-    let x = surface_at(ray, hit);
-    var radiance = vec3f(0.0);
-    if component_is_direct || component_is_full {
-        radiance += direct(x);
-    }
-    if component_is_direct {
-        return radiance;
-    }
     let bounces = select(params.max_bounces, 1u, component_is_one_bounce);
-    return gather(x, Gathered(component_is_one_bounce || component_is_indirect || component_is_full, has_sky, bounces), radiance);
+    let what = Gathered(component_is_one_bounce || component_is_indirect || component_is_full, has_sky, bounces);
+    return light_of(surface_at(ray, hit), component_is_direct || component_is_full, what);
 }
-
-// Paths of one dispatch (the declaration divides by it). Some adapters end all loops of an invocation after 65,535 rounds together, in silence
-// (Mesa's software rasterizer): four paths of many bounces through a deep hierarchy stay below.
-const PATHS_AT_ONCE: u32 = 4u;
 
 @compute @workgroup_size(8, 8)
 fn clear(@builtin(global_invocation_id) id: vec3u) {
