@@ -130,7 +130,7 @@ fn a_picture_at_a_key_frame_is_the_key_frame() {
     let (_, file) = day();
     let light = baked(file);
     let mut renderer =
-        job("precomputed.ron", &root().join("assets/day.ron")).set("look_up.sky", false).keep(&["indirect"]).baked(&light).renderer();
+        job("precomputed.ron", &root().join("assets/day.ron")).set("sky", false).keep(&["indirect"]).baked(&light).renderer();
     for hour in [9.0, 12.0, 15.0] {
         renderer.render_frame(hour * HOUR).unwrap_or_else(|e| panic!("{e}"));
         let image = read(&renderer, "indirect");
@@ -154,7 +154,7 @@ fn light_between_key_frames_is_interpolated() {
     let (_, file) = day();
     let light = baked(file);
     let mut renderer =
-        job("precomputed.ron", &root().join("assets/day.ron")).set("look_up.sky", false).keep(&["indirect"]).baked(&light).renderer();
+        job("precomputed.ron", &root().join("assets/day.ron")).set("sky", false).keep(&["indirect"]).baked(&light).renderer();
     let mut at = |time: f64| {
         renderer.render_frame(time).unwrap_or_else(|e| panic!("{e}"));
         rgb(&read(&renderer, "indirect"))
