@@ -39,6 +39,17 @@ fn error(image: &[f32], reference: &[f32]) -> f64 {
     (squares / image.len() as f64).sqrt() / mean(reference)
 }
 
+/// Means over blocks of 3×3 pixels: noise of single pixels and texels is a third there, what is wrong over some area stays.
+fn blocks(image: &[f32]) -> Vec<f32> {
+    let (width, height) = (SIZE.0 as usize / 3, SIZE.1 as usize / 3);
+    let pixel = |x: usize, y: usize, channel: usize| image[3 * (y * SIZE.0 as usize + x) + channel];
+    let mean = |i: usize| {
+        let (x, y, channel) = (i / 3 % width, i / 3 / width, i % 3);
+        (0..9).map(|j| pixel(3 * x + j % 3, 3 * y + j / 3, channel)).sum::<f32>() / 9.0
+    };
+    (0..3 * width * height).map(mean).collect()
+}
+
 /// Light of the reference at a time.
 fn traced(component: &str, time: f64, paths: u32, frames: u32) -> Vec<f32> {
     let mut renderer = job("reference.ron", &root().join("assets/day.ron")).set("component", component).set("paths", paths).renderer();
@@ -242,9 +253,123 @@ fn light_that_does_not_fit_is_refused_with_a_reason() {
     manylight(&["bake", "day"]).expect(2);
 }
 
+/// The room of `day` whose camera is that of `day` until noon and has gone to another corner by two o'clock.
+fn walk(folder: &Path) -> PathBuf {
+    let assets = root().join("assets");
+    let text = fs::read_to_string(assets.join("day.ron")).expect("a text");
+    let text = text.replace("\"day.obj\"", &format!("{:?}", assets.join("day.obj").to_string_lossy()));
+    let motion = "fov_x_deg: 72.0, motion: [(time: 43200.0), (time: 50400.0, origin: (3.4, 1.6, 1.2), target: (0.6, 1.0, 4.6))]";
+    fs::write(folder.join("walk.ron"), text.replace("fov_x_deg: 72.0", motion)).expect("written");
+    folder.join("walk.ron")
+}
+
+/// Light over the surfaces of that room, with all of its components and a key frame every two hours, baked once for all tests.
+fn walked() -> &'static (tempfile::TempDir, PathBuf, PathBuf) {
+    static WALK: OnceLock<(tempfile::TempDir, PathBuf, PathBuf)> = OnceLock::new();
+    WALK.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (scene, file) = (walk(folder.path()), folder.path().join("walk.baked"));
+        run(&bake_atlas(&scene, &file, &folder.path().join("work"))).expect(0).says(&["12 key frames", "8 frames traced"]);
+        (folder, scene, file)
+    })
+}
+
+fn bake_atlas(scene: &Path, out: &Path, work: &Path) -> Vec<String> {
+    let [scene, out, work] = [scene, out, work].map(|path| path.to_string_lossy().into_owned());
+    let files = ["bake", &scene, "--out", &out, "--work", &work];
+    let options = ["--lookup", "atlas", "--texels", "4096", "--paths", "64", "--interval", "2h", "--variance", "1"];
+    files.iter().chain(&options).map(|text| (*text).to_owned()).collect()
+}
+
+/// From wherever the camera is, light of an atlas agrees with the path tracer's: its energy to 5 % and the means of 3×3 pixels to 20 % of the mean, which is
+/// what texels of 0.2 m and 64 paths leave. The other camera's picture is farther off by a multiple.
+#[test]
+fn a_moving_camera_sees_the_light_that_is_there() {
+    let (_, scene, file) = walked();
+    let light = baked(file);
+    let mut renderer = job("precomputed.ron", scene).keep(&["indirect"]).baked(&light).set("sky", false).renderer();
+    let mut reference = job("reference.ron", scene).set("component", "indirect").set("paths", 256).renderer();
+    let mut pictures = Vec::new();
+    for hour in [12.0, 14.0] {
+        renderer.render_frame(hour * HOUR).unwrap_or_else(|e| panic!("{e}"));
+        reference.render_frame(hour * HOUR).unwrap_or_else(|e| panic!("{e}"));
+        let (image, truth) = (read(&renderer, "indirect"), rgb(&read(&reference, "composed")));
+        assert!(image.data.chunks_exact(4).all(|pixel| pixel[3] == 1.0), "every surface has a place in the atlas");
+        let image = rgb(&image);
+        let (energy, off) = (mean(&image) / mean(&truth), error(&blocks(&image), &blocks(&truth)));
+        println!("{hour} h: energy {energy:.4}, error {off:.4}");
+        assert!((energy - 1.0).abs() < 0.05 && off < 0.2, "{energy} {off}");
+        pictures.push(truth);
+    }
+    let other = error(&blocks(&pictures[0]), &blocks(&pictures[1]));
+    println!("from one camera to the other: {other:.4}");
+    assert!(other > 0.5, "the cameras see other things: {other}");
+}
+
+/// A camera that stands still sees the same by both look-ups, sky and all, to the same tolerances.
+#[test]
+fn both_look_ups_agree_where_the_camera_stands_still() {
+    let (_, scene, file) = walked();
+    let whole = |scene: &Path, file: &Path| {
+        let mut renderer = job("precomputed.ron", scene).keep(&["indirect"]).baked(&baked(file)).renderer();
+        renderer.render_frame(12.0 * HOUR).unwrap_or_else(|e| panic!("{e}"));
+        rgb(&read(&renderer, "indirect"))
+    };
+    let (atlas, image) = (whole(scene, file), whole(&root().join("assets/day.ron"), &day().1));
+    let (energy, off) = (mean(&atlas) / mean(&image), error(&blocks(&atlas), &blocks(&image)));
+    println!("energy {energy:.4}, error {off:.4}");
+    assert!((energy - 1.0).abs() < 0.05 && off < 0.2, "{energy} {off}");
+}
+
+/// A room without a window is dark inside: no light comes in where its walls meet, although texels there stand for points of their edges.
+#[test]
+fn no_light_comes_through_the_edges_of_a_closed_room() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = floor(folder.path(), "lights: [Sun(latitude_deg: 30, declination_deg: 0, irradiance: 3)], sky: 1");
+    let corners: String = (0..8).map(|i| format!("v {} {} {}\n", 2 * (i & 1) - 1, (i & 2) - 1, (i & 4) / 2 - 1)).collect();
+    let walls = "f 1 2 4 3\nf 5 6 8 7\nf 1 2 6 5\nf 3 4 8 7\nf 1 3 7 5\nf 2 4 8 6\n";
+    fs::write(folder.path().join("f.obj"), format!("mtllib f.mtl\n{corners}usemtl grey\n{walls}")).expect("written");
+    let text = fs::read_to_string(&scene).expect("a text");
+    fs::write(&scene, text.replace("origin: (0, 1, 0)", "origin: (0, 0.5, 0)")).expect("written");
+    let (file, work) = (folder.path().join("f.baked"), folder.path().join("work"));
+    let [path, out, work] = [&scene, &file, &work].map(|path| path.to_string_lossy().into_owned());
+    let files = ["bake", &path, "--out", &out, "--work", &work, "--lookup", "atlas", "--texels", "1024"];
+    manylight(&[&files[..], &["--paths", "16", "--interval", "12h"]].concat()).expect(0);
+    let mut renderer = job("precomputed.ron", &scene).keep(&["indirect"]).baked(&baked(&file)).renderer();
+    renderer.render_frame(12.0 * HOUR).unwrap_or_else(|e| panic!("{e}"));
+    let indirect = read(&renderer, "indirect");
+    assert!(indirect.data.chunks_exact(4).all(|pixel| pixel == [0.0, 0.0, 0.0, 1.0]), "{:?}", indirect.data);
+}
+
+/// Key frames of an atlas are found again as those of pictures are, and a file of it comes out the same.
+#[test]
+fn an_atlas_is_not_traced_twice() {
+    let (folder, scene, file) = walked();
+    let other = folder.path().join("other.baked");
+    run(&bake_atlas(scene, &other, &folder.path().join("work"))).expect(0).says(&["0 frames traced", "8 found"]);
+    assert_eq!(fs::read(&other).expect("a file"), fs::read(file).expect("a file"));
+}
+
+#[test]
+fn options_of_the_other_look_up_are_refused() {
+    let bake = |more: &[&str]| manylight(&[&["bake", "day", "--out", "x.baked"], more].concat());
+    bake(&["--texels", "4096"]).expect(1).says(&["--lookup atlas"]);
+    bake(&["--lookup", "atlas", "--size", "24x18"]).expect(1).says(&["--texels"]);
+    bake(&["--lookup", "atlas", "--texels", "64"]).expect(1).says(&["texels", "day"]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = walk(folder.path()).to_string_lossy().into_owned();
+    manylight(&["bake", &scene, "--out", "x.baked"]).expect(1).says(&["camera", "--lookup atlas"]);
+}
+
 /// An object that was not there when light was baked has direct light only, and what is beside it has its own.
 #[test]
 fn dynamic_objects_have_direct_light_only() {
+    for lookup in [["--lookup", "image", "--size", "24x18"], ["--lookup", "atlas", "--texels", "1024"]] {
+        dynamic_object(lookup);
+    }
+}
+
+fn dynamic_object(lookup: [&str; 4]) {
     let folder = tempfile::tempdir().expect("a folder");
     let block = format!(
         "Mesh(file: {:?}, transform: (translate: (0, 0.2, 0), scale: 0.2), motion: [(time: 0.0), (time: 86400.0, translate: (0.1, 0.2, 0.0))])",
@@ -255,15 +380,14 @@ fn dynamic_objects_have_direct_light_only() {
     fs::write(&scene, text.replace("[\"f.obj\"]", &format!("[\"f.obj\", {block}]"))).expect("written");
     let file = folder.path().join("f.baked");
     let (path, out, work) = (scene.to_string_lossy(), file.to_string_lossy(), folder.path().join("work"));
-    let arguments =
-        ["bake", &path, "--out", &out, "--work", &work.to_string_lossy(), "--size", "24x18", "--paths", "4", "--interval", "6h"]
-            .map(str::to_owned);
-    run(&arguments).expect(0);
+    let work = work.to_string_lossy();
+    let arguments = ["bake", &path, "--out", &out, "--work", &work, "--paths", "4", "--interval", "6h"];
+    manylight(&[&arguments[..], &lookup].concat()).expect(0);
     let mut renderer = job("precomputed.ron", &scene).keep(&["indirect"]).baked(&baked(&file)).renderer();
     renderer.render_frame(12.0 * HOUR).unwrap_or_else(|e| panic!("{e}"));
     let indirect = read(&renderer, "indirect");
-    assert_eq!(indirect.pixel(12, 9), [0.0; 4], "the block");
+    assert_eq!(indirect.pixel(12, 9), [0.0; 4], "the block, {lookup:?}");
     // A floor under a uniform sky of 1 has its albedo as radiance.
     let corner = indirect.pixel(0, 0);
-    assert!((corner[0] - 0.2).abs() < 1e-3 && corner[3] == 1.0, "{corner:?}");
+    assert!((corner[0] - 0.2).abs() < 1e-3 && corner[3] == 1.0, "{lookup:?}: {corner:?}");
 }

@@ -1,8 +1,17 @@
 //! Names of features: what a scene may have, and what a node may require of the device.
 
-/// Every feature that a scene reports and that `Feature("…")` conditions can test.
-pub const KNOWN: &[&str] =
-    &["textures", "glossy", "moving_objects", "deforming_objects", "moving_lights", "moving_camera", "several_lights", "normals"];
+/// Every feature that a scene or the light that was baked for it reports, and that `Feature("…")` conditions can test.
+pub const KNOWN: &[&str] = &[
+    "textures",
+    "glossy",
+    "moving_objects",
+    "deforming_objects",
+    "moving_lights",
+    "moving_camera",
+    "several_lights",
+    "normals",
+    "baked_atlas",
+];
 
 /// Device features that a node's `requires` can name: those of wgpu that change what a shader may do.
 pub const DEVICE: &[&str] = &[

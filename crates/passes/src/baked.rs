@@ -4,10 +4,11 @@
 //! texture. Light at a time between two key frames is mixed from the weights of both ([PCA] eqs. 1–3).
 //!
 //! The file, all numbers little-endian: the eight bytes `MLBAKED` and 0; version, u32; length of the header, u32; the header, JSON in UTF-8 ([`Header`]);
-//! weights, f32, a row a key frame; texels, f16, RGBA, layer by layer, rows from the top; SHA-256 of all bytes before it.
+//! weights, f32, a row a key frame; texels, f16, RGBA, layer by layer, rows from the top; corners of triangles in an
+//! atlas, f32, u and v; SHA-256 of all bytes before it.
 
 use half::f16;
-use manylight_scene::Scene;
+use manylight_scene::{Scene, SceneState};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use thiserror::Error;
@@ -26,6 +27,8 @@ const FIXED: usize = 16;
 const MOST_LAYERS: usize = 256;
 /// Sides of textures beyond this are refused before memory is asked for.
 const MOST_SIDE: usize = 16384;
+/// Corners of a triangle's two sides.
+pub const CORNERS: usize = 6;
 
 /// How light is found for a pixel. The file names it, so that a program which knows other ways can tell them apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -33,6 +36,8 @@ const MOST_SIDE: usize = 16384;
 pub enum Lookup {
     /// At the same place of the picture: the camera stands still. The texels are reflected radiance.
     Image,
+    /// In an atlas over the surfaces that stand still: the camera moves. The texels are what white matt surfaces would reflect.
+    Atlas,
 }
 
 /// What a baked file says of itself.
@@ -48,6 +53,8 @@ pub struct Header {
     pub width: usize,
     /// Rows.
     pub height: usize,
+    /// With the look-up `atlas`: triangles of all objects that stand still. Else 0.
+    pub triangles: usize,
     /// Components besides the mean.
     pub components: usize,
     /// Times of the key frames in seconds, increasing, within a period.
@@ -78,6 +85,9 @@ pub struct Baked {
     /// Mean, components, sky: RGBA, layer by layer, rows from the top. With the look-up `image`, alpha of the mean is the logarithm to base 2 of the distance
     /// from the camera, or [`NOWHERE`].
     pub texels: Vec<f16>,
+    /// With the look-up `atlas`, where the triangles of all objects that stand still are, object by object, in texels: six corners a triangle, those of the
+    /// front (from where its corners go round against the clock, but for mirrored objects), then those of the back; zero for a triangle without area.
+    pub corners: Vec<[f32; 2]>,
 }
 
 /// Why there is no baked light.
@@ -118,7 +128,15 @@ impl Header {
         self.components + 1
     }
 
+    /// Corners of all triangles.
+    pub fn corners(&self) -> usize {
+        self.triangles.saturating_mul(CORNERS)
+    }
+
     fn check(&self) -> Result<(), String> {
+        if (self.lookup == Lookup::Atlas) != (self.triangles > 0) {
+            return Err("it has the coordinates of an atlas without one, or an atlas without coordinates".to_owned());
+        }
         let side = |n: usize| (1..=MOST_SIDE).contains(&n);
         if !side(self.width) || !side(self.height) || self.layers() > MOST_LAYERS {
             return Err(format!("{}×{} texels in {} layers cannot be used", self.width, self.height, self.layers()));
@@ -145,6 +163,7 @@ impl Baked {
         bytes.extend(header);
         bytes.extend(self.weights.iter().flat_map(|v| v.to_le_bytes()));
         bytes.extend(self.texels.iter().flat_map(|v| v.to_le_bytes()));
+        bytes.extend(self.corners.iter().flatten().flat_map(|v| v.to_le_bytes()));
         let checksum = Sha256::digest(&bytes);
         bytes.extend(checksum);
         Ok(bytes)
@@ -185,13 +204,18 @@ impl Baked {
         let weights: Vec<f32> = take(header.keys.len() * header.columns(), 4)?.chunks_exact(4).map(float).collect();
         let texels = take(header.layers() * header.width * header.height * 4, 2)?;
         let texels: Vec<f16> = texels.chunks_exact(2).map(|b| f16::from_le_bytes([b[0], b[1]])).collect();
+        let corners: Vec<[f32; 2]> = take(header.corners(), 8)?.chunks_exact(8).map(|b| [float(&b[..4]), float(&b[4..])]).collect();
         if !rest.is_empty() {
             return Err(damaged("it is longer than its header says"));
         }
         if !weights.iter().all(|v| v.is_finite()) || !texels.iter().all(|v| v.is_finite()) {
             return Err(damaged("it holds numbers that are not finite"));
         }
-        Ok(Self { header, weights, texels })
+        let size = [header.width as f32, header.height as f32];
+        if !corners.iter().all(|corner| corner.iter().zip(size).all(|(v, side)| (0.0..=side).contains(v))) {
+            return Err(damaged("corners of triangles lie beside its texels"));
+        }
+        Ok(Self { header, weights, texels, corners })
     }
 
     /// Fails unless it was baked from this scene.
@@ -217,6 +241,24 @@ impl Baked {
         let mut weights: Vec<f32> = row(before).iter().zip(row(after)).map(mix).collect();
         weights.push(self.header.sky_scale * daylight as f32);
         weights
+    }
+
+    /// Where the corners of all triangles of a scene are, in the order of [`Scene::gpu_triangles_at`], with zeros for what was not baked.
+    pub fn corners_at(&self, scene: &Scene, state: &SceneState) -> Vec<[f32; 2]> {
+        let mut rest = self.corners.as_slice();
+        let mut corners = Vec::with_capacity(CORNERS * scene.room.triangles);
+        for object in &scene.objects {
+            let count = CORNERS * scene.shape(object.mesh, &state.deformed).triangles.len();
+            if scene.stands_still(object) && count <= rest.len() {
+                let (own, others) = rest.split_at(count);
+                corners.extend_from_slice(own);
+                rest = others;
+            } else {
+                corners.resize(corners.len() + count, [0.0; 2]);
+            }
+        }
+        corners.resize(corners.len().max(CORNERS * scene.room.triangles), [0.0; 2]);
+        corners
     }
 
     /// The texels of each layer as bytes.
@@ -248,6 +290,7 @@ mod tests {
             lookup: Lookup::Image,
             width: 3,
             height: 2,
+            triangles: 0,
             components: 2,
             keys: vec![0.0, 21_600.0, 30_000.0, 64_800.0],
             period_s: 86_400.0,
@@ -260,7 +303,15 @@ mod tests {
         };
         let weights = vec![0.0, 0.0, 0.0, 1.0, 0.5, -0.25, 1.0, 2.0, 4.0, 1.0, -1.0, 8.0];
         let texels = (0..4 * 3 * 2 * 4).map(|i| f16::from_f32(i as f32 / 16.0 - 2.0)).collect();
-        Baked { header, weights, texels }
+        Baked { header, weights, texels, corners: Vec::new() }
+    }
+
+    /// The same light over an atlas of two triangles.
+    fn atlas() -> Baked {
+        let mut atlas = baked();
+        (atlas.header.lookup, atlas.header.triangles) = (Lookup::Atlas, 2);
+        atlas.corners = (0..2 * CORNERS).map(|i| [i as f32 * 0.25, 2.0 - i as f32 * 0.125]).collect();
+        atlas
     }
 
     /// Numbers that look random and are the same on each run.
@@ -281,11 +332,13 @@ mod tests {
     fn a_file_comes_back_as_it_was() {
         let bytes = baked().to_bytes().expect("writable");
         assert_eq!(Baked::from_bytes(&bytes), Ok(baked()));
+        let bytes = atlas().to_bytes().expect("writable");
+        assert_eq!(Baked::from_bytes(&bytes), Ok(atlas()));
     }
 
     #[test]
     fn every_changed_byte_is_found() {
-        let bytes = baked().to_bytes().expect("writable");
+        let bytes = atlas().to_bytes().expect("writable");
         let mut state = 7;
         // All places once, and random changes at random places.
         for at in 0..bytes.len() {
@@ -311,7 +364,7 @@ mod tests {
 
     #[test]
     fn a_truncated_or_longer_file_is_refused() {
-        let bytes = baked().to_bytes().expect("writable");
+        let bytes = atlas().to_bytes().expect("writable");
         for length in 0..bytes.len() {
             let fault = Baked::from_bytes(&bytes[..length]).expect_err("truncated");
             assert_eq!(matches!(fault, BakedError::Kind), length < MAGIC.len(), "{length}: {fault}");
@@ -348,6 +401,19 @@ mod tests {
             edit(&mut wrong.header);
             let fault = Baked::from_bytes(&wrong.to_bytes().expect("writable")).expect_err("contradicts");
             assert!(matches!(fault, BakedError::Damaged { .. }), "edit {i}: {fault}");
+        }
+        let edits: [fn(&mut Baked); 5] = [
+            |b| b.header.triangles = 3,
+            |b| b.header.triangles = usize::MAX,
+            |b| b.header.lookup = Lookup::Image,
+            |b| b.corners[7][0] = f32::NAN,
+            |b| b.corners[0][1] = 2.5,
+        ];
+        for (i, edit) in edits.into_iter().enumerate() {
+            let mut wrong = atlas();
+            edit(&mut wrong);
+            let fault = Baked::from_bytes(&wrong.to_bytes().expect("writable")).expect_err("contradicts");
+            assert!(matches!(fault, BakedError::Damaged { .. }), "atlas, edit {i}: {fault}");
         }
         let mut wrong = baked();
         wrong.weights[4] = f32::NAN;

@@ -14,7 +14,7 @@ use manylight_scene::{
     gpu_data::{self, Frame, Light, LightView, SceneInfo, View},
 };
 
-use crate::baked::Baked;
+use crate::baked::{Baked, CORNERS, Lookup};
 
 /// The scene's texture array.
 const TEXTURES: &str = "scene_textures";
@@ -45,6 +45,11 @@ const ENTRIES: &[Entry] = &[
     buffer("scene_triangles", "Triangle", "triangles of all objects at this time; those beyond `scene_info.triangle_count` have no area"),
     buffer("scene_objects", "Object", "transforms of all objects at this time"),
     buffer("scene_materials", "Material", "linear albedo, specular colour and exponent, texture of all materials"),
+    buffer(
+        "baked_corners",
+        "vec2f",
+        "where in an atlas of precomputed light all triangles are, in texels: six corners each, those of the front first; zero where they were not baked",
+    ),
     buffer("baked_weights", "f32", "what each layer of `baked_light` is multiplied with at this time"),
 ];
 
@@ -86,6 +91,7 @@ pub fn declarations() -> Vec<External> {
 /// Sizes of the externals for a scene, as a plan needs them; no GPU is asked.
 pub fn descriptions(scene: &Scene, baked: Option<&Baked>) -> BTreeMap<String, ResourceDesc> {
     let count = |name: &str| match name {
+        "baked_corners" => baked.filter(|b| b.header.lookup == Lookup::Atlas).map_or(0, |_| CORNERS * scene.room.triangles),
         "baked_weights" => baked.map_or(0, |b| b.header.layers()),
         "scene_lights" => scene.lights.len(),
         "scene_light_views" => scene.light_view_count(),
@@ -143,6 +149,7 @@ fn size_of_element(element: &str) -> u32 {
         "Vertex" => size_of::<gpu_data::Vertex>(),
         "Triangle" => size_of::<gpu_data::Triangle>(),
         "f32" => size_of::<f32>(),
+        "vec2f" => size_of::<[f32; 2]>(),
         "Object" => size_of::<gpu_data::Object>(),
         _ => size_of::<gpu_data::Material>(),
     };
@@ -207,7 +214,19 @@ impl SceneUpload {
     ///
     /// # Errors
     /// Its texture is larger than the device allows.
-    pub fn upload_baked(&mut self, gpu: &Gpu, externals: &mut Externals, baked: Option<&Baked>, state: &SceneState) -> Result<(), Fault> {
+    pub fn upload_baked(
+        &mut self,
+        gpu: &Gpu,
+        externals: &mut Externals,
+        baked: Option<&Baked>,
+        scene: &Scene,
+        state: &SceneState,
+    ) -> Result<(), Fault> {
+        if !self.baked || scene.deforms() {
+            let atlas = baked.filter(|baked| baked.header.lookup == Lookup::Atlas);
+            let corners = atlas.map_or_else(Vec::new, |baked| baked.corners_at(scene, state));
+            self.set(gpu, externals, "baked_corners", cast_slice(&corners))?;
+        }
         if !self.baked {
             upload_layers(gpu, externals, baked)?;
             self.baked = true;
@@ -284,7 +303,7 @@ mod tests {
         for external in declarations() {
             match &external.kind {
                 PortKind::Buffer { of } | PortKind::Uniform { of } => {
-                    let is_plain = of == "f32";
+                    let is_plain = ["f32", "vec2f"].contains(&of.as_str());
                     let size = external.layout.as_ref().map(|layout| layout.size);
                     assert_eq!(size, (!is_plain).then(|| size_of_element(of)), "a layout for each structure: {of}");
                 }

@@ -19,11 +19,13 @@
 //!
 //! - [`renderer`]: [`Renderer`], the library's front door: render, read, reload.
 //! - [`documents`]: a library with its nodes and a pipeline; plans without a GPU.
+//! - [`atlas`]: the texels of an atlas over the surfaces of a scene.
 //! - [`baked`]: precomputed indirect light, its file and its weights.
 //! - [`externals`]: scene and frame data as pipelines see them.
 //! - [`host`]: the nodes that are written in Rust.
 //! - [`scene_source`]: where a scene is loaded from.
 
+pub mod atlas;
 pub mod baked;
 mod bvh;
 pub mod documents;

@@ -1,6 +1,7 @@
 //! [`Renderer`]: a pipeline that renders a scene, and goes on while its files change.
 
 use std::{
+    collections::BTreeMap,
     path::{Path, PathBuf},
     sync::Arc,
     time::{Duration, Instant},
@@ -20,7 +21,7 @@ use manylight_scene::{Scene, gpu_data};
 use thiserror::Error;
 
 use crate::{
-    baked::Baked,
+    baked::{Baked, Lookup},
     documents::Documents,
     externals::{SceneUpload, descriptions},
     host::{self, HostScene},
@@ -141,7 +142,6 @@ struct LoadedScene {
     externals: Externals,
     /// Whether the plan is made for less geometry than there is room for now.
     outgrown: bool,
-    baked: Option<Arc<Baked>>,
 }
 
 impl LoadedScene {
@@ -149,9 +149,8 @@ impl LoadedScene {
     fn new(source: SceneSource, mut scene: Scene, settings: &Settings, time: f64) -> Self {
         let state = scene.sample(time);
         scene.make_room(&state);
-        let host = HostScene { scene: Arc::new(scene), seed: settings.seed, state };
-        let baked = settings.baked.clone();
-        Self { source, host, upload: SceneUpload::new(), externals: Externals::new(), outgrown: false, baked }
+        let host = HostScene { scene: Arc::new(scene), seed: settings.seed, baked: settings.baked.clone(), state };
+        Self { source, host, upload: SceneUpload::new(), externals: Externals::new(), outgrown: false }
     }
 
     /// Goes to another time.
@@ -166,7 +165,7 @@ impl LoadedScene {
     fn upload(&mut self, gpu: &Gpu, size: (u32, u32), frame: &gpu_data::Frame) -> Result<(), Fault> {
         let aspect = size.0 as f32 / size.1 as f32;
         self.upload.upload(gpu, &mut self.externals, &self.host.scene, &self.host.state, frame, aspect)?;
-        self.upload.upload_baked(gpu, &mut self.externals, self.baked.as_deref(), &self.host.state)
+        self.upload.upload_baked(gpu, &mut self.externals, self.host.baked.as_deref(), &self.host.scene, &self.host.state)
     }
 
     /// Changes with the scene and with the seed.
@@ -187,6 +186,9 @@ fn check_baked(plan: &Plan, settings: &Settings, scene: &Scene) -> Result<(), Di
     };
     baked.check_scene(scene).map_err(|e| fault(format!("the baked light cannot be used: {e}"), "the command is `manylight bake`"))?;
     let ((width, height), header) = (settings.size, &baked.header);
+    if header.lookup == Lookup::Atlas {
+        return Ok(());
+    }
     let (own, other) = (f64::from(width) / f64::from(height), header.width as f64 / header.height as f64);
     if (own / other - 1.0).abs() > ASPECT_TOLERANCE {
         let message = format!("the light was baked for a picture of {}×{}, not for one of {width}×{height}", header.width, header.height);
@@ -203,11 +205,17 @@ pub fn plan_input(settings: &Settings, scene: &Scene) -> PlanInput {
     PlanInput {
         output: settings.size,
         set: settings.set.clone(),
-        features: scene.features(),
+        features: features(settings, scene),
         externals: descriptions(scene, settings.baked.as_deref()),
         keep: settings.keep.clone(),
         debug: settings.debug,
     }
+}
+
+/// What the scene has, and what the light that was baked for it has.
+fn features(settings: &Settings, scene: &Scene) -> BTreeMap<String, bool> {
+    let is_atlas = settings.baked.as_ref().is_some_and(|baked| baked.header.lookup == Lookup::Atlas);
+    scene.features().into_iter().chain([("baked_atlas".to_owned(), is_atlas)]).collect()
 }
 
 impl Renderer {
@@ -418,7 +426,7 @@ impl Renderer {
         let new_documents = documents.as_ref().unwrap_or(&self.documents);
         let time = self.last_time.unwrap_or(0.0) as f32;
         // Light that was baked is on the GPU with the scene.
-        let baked_changed = match (&new_settings.baked, &self.scene.baked) {
+        let baked_changed = match (&new_settings.baked, &self.scene.host.baked) {
             (Some(new), Some(old)) => !Arc::ptr_eq(new, old),
             (new, old) => new.is_some() != old.is_some(),
         };

@@ -1,4 +1,4 @@
-//! Structures that shaders read, laid out as `shaders/common/scene.wgsl` and `shaders/common/points.wgsl` declare them.
+//! Structures that shaders read, laid out as `shaders/common/scene.wgsl`, `points.wgsl` and `texels.wgsl` declare them.
 //!
 //! [`layouts`] describes them from Rust, so that whoever loads a shader can compare them with what reflection says of the WGSL.
 
@@ -232,6 +232,27 @@ pub struct ScenePoint {
     pub object: u32,
 }
 
+/// [`SurfaceTexel::triangle`] of a texel without a surface.
+pub const NO_TRIANGLE: u32 = u32::MAX;
+
+/// A texel of an atlas over the surfaces of the scene: world space, normals of the side whose light it holds.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct SurfaceTexel {
+    /// A point of the triangle.
+    pub position: Vec3,
+    /// Index of the [`Triangle`], or [`NO_TRIANGLE`].
+    pub triangle: u32,
+    /// Unit vector; smooth where the surface is.
+    pub normal: Vec3,
+    /// Barycentric weight of the second corner.
+    pub u: f32,
+    /// Unit vector; the triangle's own.
+    pub geometric: Vec3,
+    /// Barycentric weight of the third corner.
+    pub v: f32,
+}
+
 impl View {
     /// The perspective view of an eye at `origin` that looks at `target`.
     ///
@@ -374,5 +395,6 @@ pub fn layouts() -> Vec<(&'static str, Layout)> {
         layout!(Object { world_from_object, normal_from_object }),
         layout!(Material { diffuse, diffuse_texture, specular, shininess }),
         layout!(ScenePoint { position, area, normal, object }),
+        layout!(SurfaceTexel { position, triangle, normal, u, geometric, v }),
     ]
 }

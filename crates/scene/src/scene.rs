@@ -164,6 +164,11 @@ impl Scene {
         Ok(())
     }
 
+    /// Whether an object is the same at all times, as what is precomputed on it must be.
+    pub fn stands_still(&self, object: &SceneObject) -> bool {
+        !object.pose.moves() && self.meshes[object.mesh].deformation.is_none()
+    }
+
     /// Whether the shape of a mesh changes.
     pub fn deforms(&self) -> bool {
         self.meshes.iter().any(|mesh| mesh.deformation.is_some())

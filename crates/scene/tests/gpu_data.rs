@@ -49,6 +49,7 @@ fn layouts_are_those_of_the_wgsl() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shaders/common");
     let mut wgsl = wgsl_structs(&std::fs::read_to_string(format!("{folder}/scene.wgsl")).unwrap());
     wgsl.extend(wgsl_structs(&std::fs::read_to_string(format!("{folder}/points.wgsl")).unwrap()));
+    wgsl.extend(wgsl_structs(&std::fs::read_to_string(format!("{folder}/texels.wgsl")).unwrap()));
     // Besides rays and hits, which only shaders make.
     let hierarchy = wgsl_structs(&std::fs::read_to_string(format!("{folder}/bvh.wgsl")).unwrap());
     wgsl.extend(hierarchy.into_iter().filter(|(name, ..)| name.starts_with("Bvh")));

@@ -1,7 +1,7 @@
 //! From components to the file's numbers.
 
 use half::f16;
-use manylight_passes::baked::{Baked, Header, Lookup, NOWHERE};
+use manylight_passes::baked::{Baked, CORNERS, Header, Lookup, NOWHERE};
 
 use super::{Pca, pca};
 use crate::files::Picture;
@@ -34,8 +34,10 @@ pub struct Parts<'a> {
     pub lit: &'a [Option<usize>],
     /// Light of the sky by day.
     pub sky: &'a Picture,
-    /// Distances from the camera; 0 where there is no surface.
-    pub distance: &'a Picture,
+    /// With the look-up `image`: distances from the camera; 0 where there is no surface.
+    pub distance: Option<&'a Picture>,
+    /// With the look-up `atlas`: where the corners of triangles are, as in [`Baked`].
+    pub corners: &'a [[f32; 2]],
     /// All of the header that the rest does not say.
     pub header: Header,
 }
@@ -52,7 +54,7 @@ fn normalised(values: &[f32]) -> (Vec<f16>, f32) {
 pub fn encode(pca: &pca::Pca, keep: Keep, parts: Parts<'_>) -> Baked {
     let count = keep.of(pca);
     let (mut texels, mean_scale) = normalised(&pca.mean);
-    for (texel, distance) in texels.chunks_exact_mut(4).zip(&parts.distance.data) {
+    for (texel, distance) in texels.chunks_exact_mut(4).zip(parts.distance.iter().flat_map(|distance| &distance.data)) {
         texel[3] = f16::from_f32(if *distance > 0.0 { distance.log2() } else { NOWHERE });
     }
     let mut scales = Vec::with_capacity(count);
@@ -71,6 +73,7 @@ pub fn encode(pca: &pca::Pca, keep: Keep, parts: Parts<'_>) -> Baked {
     let header = Header {
         width: parts.sky.width,
         height: parts.sky.height,
+        triangles: parts.corners.len() / CORNERS,
         components: count,
         keys: parts.keys.to_vec(),
         kept_variance: pca.kept[..count].to_vec(),
@@ -78,7 +81,7 @@ pub fn encode(pca: &pca::Pca, keep: Keep, parts: Parts<'_>) -> Baked {
         sky_scale,
         ..parts.header
     };
-    Baked { header, weights: parts.lit.iter().flat_map(row).collect(), texels }
+    Baked { header, weights: parts.lit.iter().flat_map(row).collect(), texels, corners: parts.corners.to_vec() }
 }
 
 /// Light as a shader puts it together, on the host: RGB, without the sky.
@@ -103,6 +106,7 @@ pub fn header(scene: &manylight_scene::Scene, lookup: Lookup, period_s: f64, mea
         lookup,
         width: 0,
         height: 0,
+        triangles: 0,
         components: 0,
         keys: Vec::new(),
         period_s,
@@ -137,6 +141,7 @@ mod tests {
             lookup: Lookup::Image,
             width: 0,
             height: 0,
+            triangles: 0,
             components: 0,
             keys: Vec::new(),
             period_s: 86_400.0,
@@ -147,7 +152,7 @@ mod tests {
             paths: 1,
             manylight: String::new(),
         };
-        encode(&pca, keep, Parts { keys: &keys, lit: &lit, sky: &sky, distance: &distance, header })
+        encode(&pca, keep, Parts { keys: &keys, lit: &lit, sky: &sky, distance: Some(&distance), corners: &[], header })
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! `tracer` makes key frames and keeps them on disk, `schedule` says when they are, [`Pca`] finds their components, `encode` puts all into a
 //! [`Baked`]; `study` measures what components and intervals cost.
 
+mod atlas;
 mod encode;
 mod pca;
 mod schedule;
@@ -13,11 +14,12 @@ use manylight_graph::diagnostics::Diagnostics;
 use manylight_passes::baked::{Baked, Lookup};
 use thiserror::Error;
 
+pub use atlas::atlas;
 pub use encode::{Keep, decode};
 pub use pca::Pca;
 pub use schedule::{Criterion, Schedule, bisect, uniform};
 pub use study::{Study, Table, study};
-pub use tracer::{Light, SEED, Task, Tracer, make_work};
+pub use tracer::{Domain, Light, SEED, Task, Tracer, make_work};
 
 use crate::{
     files::{FileError, Picture, Tone},
@@ -105,6 +107,7 @@ fn keys(tracer: &mut Tracer<'_>, options: &Options, tell: &mut dyn FnMut(Event))
         Schedule::Bisection { shortest_s, longest_s, threshold, criterion } => {
             let paths = tracer.task().paths;
             let exposure = exposure_of(&tracer.frame(Light::Indirect, 0.5 * options.period_s, paths, SEED)?);
+            let eye = Eye { exposure, used: tracer.used_share() };
             let mut index = 0;
             let frame = |time: f64| {
                 tell(Event::Frame { time, index, of: None });
@@ -116,7 +119,7 @@ fn keys(tracer: &mut Tracer<'_>, options: &Options, tell: &mut dyn FnMut(Event))
                 (shortest_s, longest_s, threshold, criterion),
                 frame,
                 |a, b| mixed(a, b, 0.5),
-                |a, b| visible(a, b, exposure),
+                |a, b| eye.difference(a, b),
             )
         }
     }
@@ -132,9 +135,13 @@ fn encoded(tracer: &mut Tracer<'_>, options: &Options, pca: &Pca, keys: &[f64], 
     if daylight > 0.0 {
         sky.data.iter_mut().for_each(|v| *v /= daylight);
     }
-    let distance = tracer.distance()?;
-    let header = header(tracer.scene(), Lookup::Image, options.period_s, options.subtract_mean, paths);
-    let parts = Parts { keys, lit, sky: &sky, distance: &distance, header };
+    let (lookup, distance) = match tracer.atlas() {
+        Some(_) => (Lookup::Atlas, None),
+        None => (Lookup::Image, Some(tracer.distance()?)),
+    };
+    let header = header(tracer.scene(), lookup, options.period_s, options.subtract_mean, paths);
+    let corners = tracer.atlas().map_or(&[][..], |atlas| &atlas.corners);
+    let parts = Parts { keys, lit, sky: &sky, distance: distance.as_ref(), corners, header };
     Ok(encode(pca, options.keep, parts))
 }
 
@@ -144,11 +151,22 @@ fn mixed(a: &Picture, b: &Picture, alpha: f32) -> Picture {
     Picture { data, ..a.clone() }
 }
 
-/// Mean FLIP of two frames, both shown with one exposure for the whole day: what an eye sees that does not adapt from frame to frame.
-fn visible(image: &Picture, reference: &Picture, exposure: f32) -> Result<f64, BakeError> {
-    let shown = |picture: &Picture| {
-        let data = display(picture, exposure).iter().map(|v| f32::from(*v) / 255.0).collect();
-        Picture { tone: Tone::Display, data, ..picture.clone() }
-    };
-    Ok(compare(&shown(image), &shown(reference))?.flip.unwrap_or(0.0))
+/// How frames are looked at.
+#[derive(Debug, Clone, Copy)]
+struct Eye {
+    /// One for the whole day: the eye does not adapt from frame to frame.
+    exposure: f32,
+    /// Share of the texels that stand for a surface; the others are black in all frames.
+    used: f64,
+}
+
+impl Eye {
+    /// Mean FLIP of two frames over the texels that are used.
+    fn difference(&self, image: &Picture, reference: &Picture) -> Result<f64, BakeError> {
+        let shown = |picture: &Picture| {
+            let data = display(picture, self.exposure).iter().map(|v| f32::from(*v) / 255.0).collect();
+            Picture { tone: Tone::Display, data, ..picture.clone() }
+        };
+        Ok(compare(&shown(image), &shown(reference))?.flip.unwrap_or(0.0) / self.used)
+    }
 }

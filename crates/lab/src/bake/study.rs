@@ -2,7 +2,7 @@
 
 use manylight_passes::baked::bracket;
 
-use super::{BakeError, Criterion, Event, Keep, Light, Options, Pca, SEED, Tracer, bisect, decode, encoded, mixed, uniform, visible};
+use super::{BakeError, Criterion, Event, Eye, Keep, Light, Options, Pca, SEED, Tracer, bisect, decode, encoded, mixed, uniform};
 use crate::{
     files::Picture,
     metrics::{compare, exposure_of},
@@ -63,7 +63,7 @@ struct Day {
     keys: Vec<f64>,
     frames: Vec<Picture>,
     lit: Vec<Option<usize>>,
-    exposure: f32,
+    eye: Eye,
 }
 
 impl Day {
@@ -82,7 +82,7 @@ impl Day {
     fn error(&self, keys: &[usize], period_s: f64) -> Result<(f64, f64), BakeError> {
         let (mut sum, mut most, mut count) = (0.0, 0.0_f64, 0);
         for (i, frame) in self.lit_frames() {
-            let flip = visible(&self.interpolated(keys, period_s, self.keys[i]), frame, self.exposure)?;
+            let flip = self.eye.difference(&self.interpolated(keys, period_s, self.keys[i]), frame)?;
             (sum, most, count) = (sum + flip, most.max(flip), count + 1);
         }
         Ok((sum / f64::from(count.max(1)), most))
@@ -117,8 +117,8 @@ fn day(tracer: &mut Tracer<'_>, period_s: f64, interval_s: f64, tell: &mut dyn F
         lit.push((!dark).then(|| lit.iter().flatten().count()));
         frames.push(tracer.frame(Light::Indirect, *time, paths, SEED)?);
     }
-    let exposure = exposure_of(&frames[frames.len() / 2]);
-    Ok(Day { keys, frames, lit, exposure })
+    let eye = Eye { exposure: exposure_of(&frames[frames.len() / 2]), used: tracer.used_share() };
+    Ok(Day { keys, frames, lit, eye })
 }
 
 fn components(tracer: &mut Tracer<'_>, options: &Options, day: &Day, tell: &mut dyn FnMut(Event)) -> Result<Table, BakeError> {
@@ -136,12 +136,12 @@ fn components(tracer: &mut Tracer<'_>, options: &Options, day: &Day, tell: &mut 
             let metrics = compare(&image, frame)?;
             squares += metrics.rmse.powi(2);
             light += metrics.mean_reference;
-            flip += visible(&image, frame, day.exposure)?;
+            flip += day.eye.difference(&image, frame)?;
         }
         let n = slices.len() as f64;
         let mut beyond = 0.0;
         for (time, frame) in &truth {
-            beyond += visible(&decode(&baked, *time), frame, day.exposure)? / truth.len() as f64;
+            beyond += day.eye.difference(&decode(&baked, *time), frame)? / truth.len() as f64;
         }
         let paper = match k {
             5 => "95 %",
@@ -166,8 +166,8 @@ fn components(tracer: &mut Tracer<'_>, options: &Options, day: &Day, tell: &mut 
          at {} times, and has their noise in it.",
         slices.len(),
         day.keys.len(),
-        tracer.task().size.0,
-        tracer.task().size.1,
+        tracer.size().0,
+        tracer.size().1,
         tracer.task().paths,
         MORE_PATHS * tracer.task().paths,
         truth.len()
@@ -223,7 +223,7 @@ fn intervals(period_s: f64, day: &Day) -> Result<Table, BakeError> {
             let index = |time: f64| (time / shortest).round() as usize % count;
             let frame = |time: f64| Ok::<_, BakeError>(day.frames[index(time)].clone());
             let schedule = (shortest, LONGEST * period_s, threshold, criterion);
-            let times = bisect(period_s, schedule, frame, |a, b| mixed(a, b, 0.5), |a, b| visible(a, b, day.exposure))?;
+            let times = bisect(period_s, schedule, frame, |a, b| mixed(a, b, 0.5), |a, b| day.eye.difference(a, b))?;
             let keys: Vec<usize> = times.into_iter().map(index).collect();
             let errors = day.error(&keys, period_s)?;
             let saved = |known: &[(f64, f64)], error: f64| {

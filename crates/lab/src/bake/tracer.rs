@@ -1,11 +1,14 @@
 //! Key frames by the path tracer, each kept on disk under a name made of what determines it: a bake that was stopped goes on where it was.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use manylight_gpu::Gpu;
 use manylight_graph::library::Library;
-use manylight_passes::{Documents, Renderer, SceneSource, Settings, plan_input};
-use manylight_scene::Scene;
+use manylight_passes::{Baked, Documents, Renderer, SceneSource, Settings, plan_input};
+use manylight_scene::{Scene, gpu_data::NO_TRIANGLE};
 
 use super::BakeError;
 use crate::{
@@ -36,6 +39,21 @@ impl Light {
     }
 }
 
+/// What the texels of key frames are spread over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Domain {
+    /// The pixels of one picture, for a camera that stands still.
+    Picture {
+        /// Width and height.
+        size: (u32, u32),
+    },
+    /// Both sides of all surfaces that stand still, for a camera that moves.
+    Atlas {
+        /// The most there may be.
+        texels: u32,
+    },
+}
+
 /// What is baked, and from what.
 #[derive(Debug, Clone)]
 pub struct Task<'a> {
@@ -43,8 +61,8 @@ pub struct Task<'a> {
     pub library: &'a Library,
     /// The scene. Objects that move are left out: they are not there in the key frames.
     pub source: &'a SceneSource,
-    /// Size of the picture.
-    pub size: (u32, u32),
+    /// What is seen of it.
+    pub domain: Domain,
     /// Paths a texel of each key frame.
     pub paths: u32,
     /// Folder of finished key frames.
@@ -58,6 +76,10 @@ pub struct Tracer<'a> {
     task: Task<'a>,
     documents: Documents,
     scene: Scene,
+    size: (u32, u32),
+    atlas: Option<Arc<Baked>>,
+    /// Share of the texels that stand for a surface.
+    used_share: f64,
     renderer: Option<Renderer>,
     /// Frames that were traced, and frames that were there.
     pub traced: usize,
@@ -72,22 +94,50 @@ impl<'a> Tracer<'a> {
     /// They have faults, or the scene cannot be baked.
     pub fn new(gpu: &'a Gpu, task: Task<'a>) -> Result<Self, BakeError> {
         let mut scene = task.source.load()?;
-        if scene.camera.moves() {
-            let message = format!("the camera of `{}` moves, and baked light is for one that stands still", scene.name);
+        let is_atlas = matches!(task.domain, Domain::Atlas { .. });
+        if scene.camera.moves() && !is_atlas {
+            let message = format!(
+                "the camera of `{}` moves, and baked light of a picture is for one that stands still: bake it over the surfaces by --lookup atlas",
+                scene.name
+            );
             return Err(BakeError::Input(message));
         }
-        scene.objects.retain(|object| !object.pose.moves());
+        let deforms: Vec<bool> = scene.meshes.iter().map(|mesh| mesh.deformation.is_some()).collect();
+        scene.objects.retain(|object| !(object.pose.moves() || is_atlas && deforms[object.mesh]));
         if scene.objects.is_empty() {
             return Err(BakeError::Input(format!("every object of `{}` moves: there is nothing to bake", scene.name)));
         }
-        let pipeline = "pipelines/bake/image.ron";
+        let (pipeline, size, atlas, used_share) = match task.domain {
+            Domain::Picture { size } => ("pipelines/bake/image.ron", size, None, 1.0),
+            Domain::Atlas { texels } => {
+                let atlas = super::atlas(&scene, texels)?;
+                let texels = manylight_passes::atlas::texels(&scene, &scene.sample(0.0), &atlas);
+                let used = texels.iter().filter(|texel| texel.triangle != NO_TRIANGLE).count() as f64 / texels.len() as f64;
+                ("pipelines/bake/atlas.ron", (atlas.header.width as u32, atlas.header.height as u32), Some(Arc::new(atlas)), used)
+            }
+        };
         let documents = Documents::load(task.library.clone(), Path::new(pipeline))?;
-        Ok(Self { gpu, task, documents, scene, renderer: None, traced: 0, found: 0 })
+        Ok(Self { gpu, task, documents, scene, size, atlas, used_share, renderer: None, traced: 0, found: 0 })
     }
 
     /// The scene without what moves. Its hash is that of the whole scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Width and height of key frames.
+    pub fn size(&self) -> (u32, u32) {
+        self.size
+    }
+
+    /// Where triangles are in key frames, if these are no pictures.
+    pub fn atlas(&self) -> Option<&Baked> {
+        self.atlas.as_deref()
+    }
+
+    /// Share of the texels of a key frame that stand for a surface.
+    pub fn used_share(&self) -> f64 {
+        self.used_share
     }
 
     /// What is baked.
@@ -105,7 +155,7 @@ impl<'a> Tracer<'a> {
     /// # Errors
     /// The frame cannot be rendered or kept.
     pub fn frame(&mut self, light: Light, time: f64, paths: u32, seed: u32) -> Result<Picture, BakeError> {
-        let (width, height) = self.task.size;
+        let (width, height) = self.size;
         if light == Light::Indirect && self.is_dark(time) {
             return Ok(Picture::linear(width as usize, height as usize, 3, vec![0.0; 3 * width as usize * height as usize]));
         }
@@ -113,7 +163,9 @@ impl<'a> Tracer<'a> {
         let settings = self.settings(light, paths.div_ceil(frames), seed);
         let plan = self.documents.plan(&plan_input(&settings, &self.scene))?;
         let version = env!("CARGO_PKG_VERSION");
-        let name = facts::hash(&[&facts::fingerprint(&plan), &format!("{:016x} {time:?} {frames} {seed} {version}", self.scene.hash)]);
+        let corners = self.atlas.as_ref().map(|atlas| &atlas.corners);
+        let inputs = format!("{:016x} {time:?} {frames} {seed} {version} {corners:?}", self.scene.hash);
+        let name = facts::hash(&[&facts::fingerprint(&plan), &inputs]);
         let file = self.task.work.join(format!("{name}.exr"));
         if let Some(picture) = kept(&file, width as usize, height as usize) {
             self.found += 1;
@@ -145,10 +197,11 @@ impl<'a> Tracer<'a> {
     fn settings(&self, light: Light, paths: u32, seed: u32) -> Settings {
         let set = [("component", light.component().to_owned()), ("paths", paths.to_string())];
         Settings {
-            size: self.task.size,
+            size: self.size,
             set: set.map(|(name, value)| (name.to_owned(), value)).to_vec(),
-            keep: vec!["gbuffer_depth".to_owned()],
+            keep: self.atlas.is_none().then(|| "gbuffer_depth".to_owned()).into_iter().collect(),
             seed,
+            baked: self.atlas.clone(),
             ..Settings::default()
         }
     }

@@ -15,12 +15,22 @@ pub enum CriterionArg {
     Ends,
 }
 
+/// How baked light is found for a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LookupArg {
+    /// At its place in the picture: for a camera that stands still.
+    Image,
+    /// In an atlas over the surfaces: for a camera that moves.
+    Atlas,
+}
+
 /// `manylight bake`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     manylight bake day --out day.baked\n  \
     manylight bake rooms/hall.ron --out hall.baked --size 400x300 --paths 256 --threshold 0.02 --variance 0.998\n  \
     manylight render precomputed --scene day --baked day.baked --time 36000 --out morning.png\n  \
+    manylight bake day --lookup atlas --texels 16384 --out walk.baked\n  \
     manylight bake day --size 64x48 --report tables\n\
     A bake that was stopped goes on where it was: finished key frames are in the work folder.")]
 pub struct BakeArgs {
@@ -30,10 +40,16 @@ pub struct BakeArgs {
     /// Write baked light to this file
     #[arg(long, value_name = "FILE", required_unless_present = "report")]
     pub out: Option<PathBuf>,
-    /// Size of the key frames in pixels; pictures of other sizes and the same proportions are interpolated
-    #[arg(long, value_name = "WxH", default_value = "160x120", value_parser = values::size)]
-    pub size: (u32, u32),
-    /// Paths a pixel of each key frame; time is linear in it
+    /// How light is found for a pixel
+    #[arg(long, value_enum, default_value = "image")]
+    pub lookup: LookupArg,
+    /// With the look-up `image`: size of the key frames in pixels; pictures of other sizes and the same proportions are interpolated [default: 160x120]
+    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    pub size: Option<(u32, u32)>,
+    /// With the look-up `atlas`: the most texels of a key frame, over both sides of all surfaces [default: 32768]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=16_777_216))]
+    pub texels: Option<u32>,
+    /// Paths a texel of each key frame; time is linear in it
     #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub paths: u32,
     /// Time between key frames, or with --threshold the shortest

@@ -6,7 +6,7 @@ pub mod values;
 
 use std::path::PathBuf;
 
-pub use bake::{BakeArgs, CriterionArg};
+pub use bake::{BakeArgs, CriterionArg, LookupArg};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 pub use lab::{LabArgs, SweepArgs, TuneArgs};
 

@@ -6,31 +6,37 @@ use indicatif::ProgressBar;
 use manylight::{
     fault::Fault,
     files::{FileError, write_text, write_whole},
-    lab::bake::{BakeError, Criterion, Event, Keep, Options, Schedule, Task, Tracer, bake, make_work, study},
+    lab::bake::{BakeError, Criterion, Domain, Event, Keep, Options, Schedule, Task, Tracer, bake, make_work, study},
     library,
     passes::Baked,
 };
 
 use super::{lab::cache, note, of_file};
 use crate::{
-    cli::{BakeArgs, Cli, CriterionArg},
+    cli::{BakeArgs, Cli, CriterionArg, LookupArg},
     progress,
 };
 
 /// The share of the variance that the paper's ten components hold ([PCA] 3.2).
 const DEFAULT_VARIANCE: f64 = 0.986;
 
+/// Of key frames in pixels.
+const DEFAULT_SIZE: (u32, u32) = (160, 120);
+/// Most texels of key frames that are an atlas.
+const DEFAULT_TEXELS: u32 = 32_768;
+
 /// Traces what is not on disk yet, then writes the file, the tables, or both.
 pub fn run(cli: &Cli, args: &BakeArgs) -> Result<(), Fault> {
     if let Some(file) = &args.out {
         super::writable(file)?;
     }
+    let domain = domain(args)?;
     let library = library::open(cli.root.as_deref())?;
     let source = library::scene(&library, &args.scene)?;
     let work = make_work(&cache(args.work.as_ref(), "bakes")?).map_err(of_file)?;
     let gpu = super::open_gpu(args.adapter.as_ref())?;
     note(&format!("adapter: {}", super::adapter_line(&gpu)));
-    let task = Task { library: &library, source: &source, size: args.size, paths: args.paths, work: &work };
+    let task = Task { library: &library, source: &source, domain, paths: args.paths, work: &work };
     let mut tracer = Tracer::new(&gpu, task).map_err(of_bake)?;
     super::warn(&tracer.scene().warnings);
     let options = options(args);
@@ -53,6 +59,18 @@ pub fn run(cli: &Cli, args: &BakeArgs) -> Result<(), Fault> {
     }
     bar.finish_and_clear();
     Ok(())
+}
+
+/// What light is traced at.
+fn domain(args: &BakeArgs) -> Result<Domain, Fault> {
+    match (args.lookup, args.size, args.texels) {
+        (LookupArg::Image, size, None) => Ok(Domain::Picture { size: size.unwrap_or(DEFAULT_SIZE) }),
+        (LookupArg::Atlas, None, texels) => Ok(Domain::Atlas { texels: texels.unwrap_or(DEFAULT_TEXELS) }),
+        (LookupArg::Image, ..) => {
+            Err(Fault::Input("--texels is of the look-up `atlas`: add --lookup atlas, or give --size instead".to_owned()))
+        }
+        (LookupArg::Atlas, ..) => Err(Fault::Input("--size is of the look-up `image`: an atlas has --texels instead".to_owned())),
+    }
 }
 
 fn options(args: &BakeArgs) -> Options {
@@ -91,8 +109,10 @@ fn summary(file: &Path, baked: &Baked, bytes: usize, traced: usize, found: usize
     let header = &baked.header;
     let kept = header.kept_variance.last().map_or(100.0, |kept| 100.0 * kept);
     format!(
-        "{}: {} key frames ({} dark, which are not stored), {} components with {kept:.3} % of the variance, {bytes} bytes; {traced} frames traced, {found} found\n",
+        "{}: {}×{} texels, {} key frames ({} dark, which are not stored), {} components with {kept:.3} % of the variance, {bytes} bytes; {traced} frames traced, {found} found\n",
         file.display(),
+        header.width,
+        header.height,
         header.keys.len(),
         header.dark_keys,
         header.components
