@@ -14,7 +14,7 @@ use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescript
 use crate::{
     bind::PARAMS,
     diagnostics::{Diagnostic, Source, Span},
-    reflect::Places,
+    reflect::{Places, demangle},
     render::{and_also, suggest},
     wgsl::{self, Scan},
 };
@@ -312,13 +312,29 @@ impl Composition {
             return Err(vec![fault]);
         };
         self.composer = Some(composer);
-        let module = outcome.map_err(|fault| vec![fault])?;
+        let mut module = outcome.map_err(|fault| vec![fault])?;
+        number_imported(&mut module);
         match Validator::new(ValidationFlags::all(), Capabilities::all()).validate(&module) {
             Ok(info) => Ok((module, info)),
             Err(error) => {
                 let message = format!("the shader is not valid: {}", self.undecorate(&chain(&error)));
                 Err(vec![Diagnostic::error(message, Span::new(source, 0..0))])
             }
+        }
+    }
+}
+
+/// Numbers the bindings of imported globals by their names. The composer counts on over all that it has composed, so that its numbers depend on what that was;
+/// but equal text with equal imports must be an equal module.
+fn number_imported(module: &mut naga::Module) {
+    let imported =
+        |variable: &naga::GlobalVariable| variable.name.clone().filter(|name| demangle(name) != name && variable.binding.is_some());
+    let names: BTreeSet<String> = module.global_variables.iter().filter_map(|(_, variable)| imported(variable)).collect();
+    for (_, variable) in module.global_variables.iter_mut() {
+        if let Some(number) = imported(variable).and_then(|name| names.iter().position(|other| *other == name))
+            && let Some(binding) = &mut variable.binding
+        {
+            binding.binding = number as u32;
         }
     }
 }

@@ -51,3 +51,35 @@ fn a_faulty_declaration_keeps_its_shader_for_later() {
     let (third, _) = second.reload(&library(&files()), &[], externals());
     assert!(same(&first, &third, "post/blur"));
 }
+
+/// Numbers of bindings are part of a module, and a module is known by the hash of its texts.
+#[test]
+fn a_shader_that_is_mended_has_the_bindings_that_it_had() {
+    let common = "@group(1) @binding(auto) var<storage, read> lights: array<vec4f>;\nfn first() -> f32 {\n    return lights[0].x;\n}\n";
+    let imports = |text: &str| format!("#import common::lights::first\n{}", text.replace("a + b", "a * first() + b"));
+    let (_, text) = files().into_iter().find(|(name, _)| name == "shaders/post/blur.wgsl").unwrap();
+    let lit = add(files(), "shaders/common/lights.wgsl", common);
+    // Another module with a global, which is composed before in some orders.
+    let lit = add(
+        lit,
+        "shaders/common/aaa.wgsl",
+        "@group(1) @binding(auto) var<storage, read> more: array<vec4f>;\nfn more_of() -> f32 {\n    return more[0].x;\n}\n",
+    );
+    let lit = add(lit, "shaders/post/blur.wgsl", &imports(&text));
+    let ron = files().into_iter().find(|(name, _)| name == "shaders/post/blur.ron").unwrap().1;
+    let lit = add(lit, "shaders/post/blur.ron", &ron.replace("inputs: {", "inputs: { \"lights\": Buffer(of: \"vec4f\", doc: \"lights\"),"));
+    let load = |old: &Registry, files: &Files| {
+        let (registry, faults) = old.reload(&library(files), &[], externals());
+        assert!(faults.is_empty(), "{faults}");
+        registry
+    };
+    let bindings = |registry: &Registry| {
+        let shader = registry.nodes["post/blur"].shader.as_ref().unwrap();
+        (shader.hash, shader.globals.iter().map(|g| (g.name.clone(), g.group, g.binding)).collect::<Vec<_>>())
+    };
+    let first = load(&Registry::default(), &lit);
+    let edited = load(&first, &add(lit.clone(), "shaders/post/blur.wgsl", &imports(&text).replace("+ b", "- b")));
+    let mended = load(&edited, &lit);
+    assert_ne!(bindings(&first).0, bindings(&edited).0);
+    assert_eq!(bindings(&first), bindings(&mended));
+}
