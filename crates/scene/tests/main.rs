@@ -9,6 +9,9 @@ mod gpu_data;
 mod import;
 mod memory;
 mod motion;
+#[path = "../../../tests/tests/fuzz/mutate.rs"]
+#[allow(dead_code, reason = "shared with the tests that cross the crates")]
+mod mutate;
 mod points;
 mod robustness;
 mod scene_file;
