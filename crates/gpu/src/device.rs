@@ -156,8 +156,10 @@ impl Gpu {
         self.inner.complaints.count.load(Ordering::Relaxed)
     }
 
-    /// Why the device is gone, when it is.
+    /// Why the device is gone, when it is: nothing works on it from then on, and all that was on it is lost. Never waits.
     pub fn lost(&self) -> Option<String> {
+        // The callback is called from here at the latest. A failed look means a lost device, which it has told by then.
+        let _ = self.device().poll(wgpu::PollType::Poll);
         lock(&self.inner.complaints.lost).clone()
     }
 
@@ -224,8 +226,12 @@ fn listen(device: &wgpu::Device, complaints: &Arc<Complaints>) {
     }));
     let heard = complaints.clone();
     device.set_device_lost_callback(move |reason, message| {
-        if reason != wgpu::DeviceLostReason::Destroyed {
-            *lock(&heard.lost) = Some(format!("{reason:?}: {message}"));
-        }
+        let said = message.trim();
+        let why = match reason {
+            wgpu::DeviceLostReason::Destroyed => "it was destroyed",
+            _ if said.is_empty() => "the driver does not say why",
+            _ => said,
+        };
+        *lock(&heard.lost) = Some(why.to_owned());
     });
 }

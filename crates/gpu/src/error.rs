@@ -47,7 +47,7 @@ fn list(names: &[String]) -> String {
 
 /// A size that the device does not allow.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{subject} needs {needed}{unit}, but this GPU allows {allowed}{unit} ({limit})")]
+#[error("{subject} needs {needed}{unit}, but this GPU allows {allowed}{unit} ({limit}){}", help(remedy))]
 pub struct LimitError {
     /// What needs it (``resource `ism` (R32Float 32768×32768)``).
     pub subject: String,
@@ -59,6 +59,12 @@ pub struct LimitError {
     pub unit: &'static str,
     /// The limit's name in WebGPU.
     pub limit: &'static str,
+    /// What to lower, or empty.
+    pub remedy: String,
+}
+
+fn help(remedy: &str) -> String {
+    if remedy.is_empty() { String::new() } else { format!("\nhelp: {remedy}") }
 }
 
 /// One reason why a frame cannot be built.
@@ -73,6 +79,8 @@ pub enum Fault {
     Limit(#[from] LimitError),
     #[error("{resource} cannot be created: {message}")]
     Resource { resource: String, message: String },
+    #[error("there is not enough memory for {resource}: the resources of the frame need {needed}{}", help(remedy))]
+    OutOfMemory { resource: String, needed: String, remedy: String },
     #[error("external `{name}` is not there: the plan reads it, but nobody set it")]
     MissingExternal { name: String },
     #[error("external `{name}` is {actual}, but the plan was made for {expected}")]
@@ -87,7 +95,7 @@ pub enum Fault {
     UnknownHost { node: String, kind: String },
     #[error("host node `{node}`, port `{port}`: {message}")]
     HostPort { node: String, port: String, message: String },
-    #[error("the GPU device was lost: {reason}")]
+    #[error("{}", lost(reason))]
     Lost { reason: String },
     #[error("the frame cannot be recorded: {message}")]
     Recording { message: String },
@@ -149,8 +157,17 @@ pub enum RunError {
     #[error("the GPU reported an error while the frame was run: {0}")]
     Gpu(String),
     /// The device is gone.
-    #[error("the GPU device was lost: {0}")]
+    #[error("{}", lost(.0))]
     Lost(String),
+}
+
+/// What is to be said and done about a lost device.
+pub(crate) fn lost(reason: &str) -> String {
+    format!(
+        "the GPU was lost: {reason}\n\
+         help: drivers reset a GPU that is busy for seconds, and when they are updated: run it again, if it happens again with a smaller picture or with fewer \
+         clusters, points or rays"
+    )
 }
 
 /// Why a host node could not do its work.
@@ -213,10 +230,13 @@ pub enum ReadError {
     },
 }
 
+/// What [`tidy`] makes of an error of memory.
+pub(crate) const OUT_OF_MEMORY: &str = "out of memory";
+
 /// wgpu's message without its headline and indentation.
 pub(crate) fn tidy(error: &wgpu::Error) -> String {
     let text = match error {
-        wgpu::Error::OutOfMemory { .. } => return "out of memory".to_owned(),
+        wgpu::Error::OutOfMemory { .. } => return OUT_OF_MEMORY.to_owned(),
         other => other.to_string(),
     };
     let body = text.split_once("Caused by:").map_or(text.as_str(), |(_, body)| body);

@@ -9,7 +9,7 @@ use crate::{
     device::Gpu,
     error::Fault,
     format::{buffer_bytes, byte_size, describe, mip_size, texture_format},
-    limits::check_resource,
+    limits::{check_planned, out_of_memory},
 };
 
 /// Memory of a resource.
@@ -126,7 +126,7 @@ pub(crate) fn allocate(
 ) -> Result<Allocated, Vec<Fault>> {
     let mut faults = Vec::new();
     for r in plan.resources.iter().filter(|r| r.lifetime != Lifetime::External) {
-        if let Err(fault) = check_resource(gpu.limits(), &format!("resource `{}`", r.name), &r.desc) {
+        if let Err(fault) = check_planned(gpu.limits(), plan, r) {
             faults.push(Fault::Limit(fault));
         }
     }
@@ -164,7 +164,7 @@ pub(crate) fn allocate(
         };
         match place {
             Ok(place) => out.resources.push(Resource { name: r.name.clone(), desc: r.desc.clone(), place }),
-            Err(fault) => faults.push(fault),
+            Err(fault) => faults.push(out_of_memory(plan, fault)),
         }
     }
     if faults.is_empty() { Ok(out) } else { Err(faults) }

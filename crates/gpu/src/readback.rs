@@ -11,7 +11,7 @@ use manylight_graph::{
 use crate::{
     decode::{decode_texel, elements_to_json},
     device::Gpu,
-    error::ReadError,
+    error::{ReadError, lost},
     externals::Externals,
     format::{channels, describe, mip_size, texel_bytes},
     frame::Frame,
@@ -175,6 +175,9 @@ pub fn read_bytes(gpu: &Gpu, name: &str, memory: &Memory, desc: &ResourceDesc) -
 
 /// Copies into a buffer of `size` bytes, waits and returns them.
 fn fetch(gpu: &Gpu, name: &str, size: u64, copy: impl FnOnce(&mut wgpu::CommandEncoder, &wgpu::Buffer)) -> Result<Vec<u8>, ReadError> {
+    if let Some(reason) = gpu.lost() {
+        return Err(failed(name, lost(&reason)));
+    }
     if size > gpu.limits().max_buffer_size {
         return Err(failed(
             name,
@@ -204,7 +207,7 @@ fn fetch(gpu: &Gpu, name: &str, size: u64, copy: impl FnOnce(&mut wgpu::CommandE
     match told.recv_timeout(TELLING) {
         Ok(Ok(())) => {}
         _ => {
-            let reason = gpu.lost().unwrap_or_else(|| "the buffer could not be mapped".to_owned());
+            let reason = gpu.lost().map_or_else(|| "the buffer could not be mapped".to_owned(), |reason| lost(&reason));
             return Err(failed(name, reason));
         }
     }

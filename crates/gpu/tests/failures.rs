@@ -94,6 +94,41 @@ fn sizes_beyond_the_limits_name_the_resource_and_both_numbers() {
 }
 
 #[test]
+fn sizes_beyond_the_limits_name_the_parameters_to_lower() {
+    let mut world = working(WORK);
+    world.write(
+        "pipelines/test.ron",
+        r#"Pipeline(doc: "t", params: {"most": Int(min: 1, max: 9, default: 3, doc: "numbers"), "other": Int(min: 1, max: 9, default: 1, doc: "nothing")},
+        resources: {"values": Buffer(of: "f32", count: Elements("more")), "more": Buffer(of: "f32", count: Mul([Param("most"), 2])),
+            "picture": Texture(format: Rgba32Float, size: Output)},
+        nodes: [(id: "more", node: "test/work", out: {"values": "more"}), (id: "work", node: "test/work"), (id: "show", node: "test/show")],
+        presents: "picture")"#,
+    );
+    let most = world.gpu.limits().max_storage_buffer_binding_size;
+    let mut plan = world.plan();
+    let values = plan.resource("values").unwrap();
+    if let ResourceDesc::Buffer { count, .. } = &mut plan.resources[values].desc {
+        *count = most / 4 + 1;
+    }
+    let error = build_error(&world, &plan).to_string();
+    for part in ["`values`", &most.to_string(), "help: lower `most` (now 3)"] {
+        assert!(error.contains(part), "{error}");
+    }
+}
+
+#[test]
+fn memory_that_a_workgroup_cannot_share_names_the_node() {
+    let world = working(
+        "override n: u32 = 1u; @group(0) @binding(0) var<storage, read_write> values: array<f32>; var<workgroup> all: array<vec4f, 1048576>;
+        @compute @workgroup_size(1) fn work() { all[n] = vec4f(1.0); values[0] = all[n].x; }",
+    );
+    let error = world.try_build(None).unwrap_err().to_string();
+    for part in ["`work`", "16777216", "max_compute_workgroup_storage_size", "var<workgroup>"] {
+        assert!(error.contains(part), "{error}");
+    }
+}
+
+#[test]
 fn dispatches_beyond_the_limits_name_the_node() {
     let world = working(WORK);
     let most = world.gpu.limits().max_compute_workgroups_per_dimension;

@@ -81,6 +81,8 @@ pub struct PlanResource {
     pub name: String,
     /// Format and size.
     pub desc: ResourceDesc,
+    /// Names of the parameters of the pipeline that its size is computed from.
+    pub sized_by: Vec<String>,
     /// How it lives.
     pub lifetime: Lifetime,
     /// Usages over all nodes of the plan.

@@ -124,7 +124,7 @@ impl<'a> Planner<'a, '_> {
         for name in names.map(String::as_str).filter(|n| used.contains(n)) {
             if let Some(desc) = sizes.get(name, self.out) {
                 let external = !self.linked.pipeline.resources.contains_key(name);
-                table.add(name, desc, external);
+                table.add(name, desc, sizes.sized_by(name), external);
             }
         }
         let mut nodes = Vec::with_capacity(order.len());
@@ -216,10 +216,10 @@ struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    fn add(&mut self, name: &'a str, desc: crate::value::ResourceDesc, external: bool) {
+    fn add(&mut self, name: &'a str, desc: crate::value::ResourceDesc, sized_by: Vec<String>, external: bool) {
         self.index.insert(name, self.resources.len());
         let lifetime = if external { Lifetime::External } else { Lifetime::Kept };
-        self.resources.push(PlanResource { name: name.to_owned(), desc, lifetime, usage: Usage::default() });
+        self.resources.push(PlanResource { name: name.to_owned(), desc, sized_by, lifetime, usage: Usage::default() });
         self.lives.push(None);
         self.previous.push(false);
     }

@@ -114,7 +114,25 @@ pub(crate) fn reflect(module: &Module, info: &ModuleInfo, places: &dyn Places) -
             fault("the workgroup size is an override; write numbers or a `const`");
         }
         let color_targets = if stage == Stage::Fragment { targets(module, entry).len() as u32 } else { 0 };
-        out.entries.push(Entry { name: entry.name.clone(), stage, workgroup_size, uses, color_targets });
+        let bytes_in = |space: AddressSpace| -> u64 {
+            let used = module.global_variables.iter().filter(|(handle, v)| v.space == space && !uses_info[*handle].is_empty());
+            used.map(|(_, variable)| bytes(module, variable.ty)).sum()
+        };
+        let own = bytes_in(AddressSpace::Private) + local_bytes(module, &entry.function);
+        if own > MOST_OWN_BYTES {
+            fault(&too_much_of_its_own(own));
+        }
+        let workgroup_bytes = bytes_in(AddressSpace::WorkGroup);
+        out.entries.push(Entry { name: entry.name.clone(), stage, workgroup_size, uses, color_targets, workgroup_bytes });
+    }
+    for (_, function) in module.functions.iter() {
+        let own = local_bytes(module, function);
+        if own > MOST_OWN_BYTES {
+            let decorated = function.name.as_deref().unwrap_or("");
+            let name = demangle(decorated).to_owned();
+            let span = places.item(places.module(decorated), "fn", &name);
+            out.faults.push((name, span, too_much_of_its_own(own)));
+        }
     }
     for (_, constant) in module.overrides.iter() {
         if let (Some(name), Some(scalar)) = (&constant.name, scalar_of(&module.types[constant.ty].inner)) {
@@ -122,6 +140,22 @@ pub(crate) fn reflect(module: &Module, info: &ModuleInfo, places: &dyn Places) -
         }
     }
     out
+}
+
+/// More memory of its own than this no invocation can have: WebGPU promises 8 KiB, and drivers crash when they run out of it.
+const MOST_OWN_BYTES: u64 = 64 << 10;
+
+fn too_much_of_its_own(bytes: u64) -> String {
+    format!("its variables take {bytes} bytes in each invocation, more than {MOST_OWN_BYTES}: put them into a buffer")
+}
+
+fn bytes(module: &Module, ty: Handle<Type>) -> u64 {
+    module.types[ty].inner.size(module.to_ctx()).into()
+}
+
+/// Bytes of the variables of a function.
+fn local_bytes(module: &Module, function: &naga::Function) -> u64 {
+    function.local_variables.iter().map(|(_, variable)| bytes(module, variable.ty)).sum()
 }
 
 /// Whether a vertex entry point takes `@location` inputs.

@@ -101,6 +101,8 @@ pub struct Entry {
     pub uses: Vec<(usize, Access)>,
     /// For a fragment entry: number of `@location` outputs.
     pub color_targets: u32,
+    /// Bytes of the `var<workgroup>` that it uses.
+    pub workgroup_bytes: u64,
 }
 
 /// A scalar or vector type of a structure's member or of an override.

@@ -183,14 +183,24 @@ impl<'a, 'p> Sizes<'a, 'p> {
         Some(ResourceDesc::Texture { format, width, height, layers: 1, array: false, mips, encoding })
     }
 
-    fn depends_on_itself(&self, name: &str) -> bool {
+    fn depends_on_itself(&self, name: &'a str) -> bool {
         // Linking reports circles among sizes and taints them; a tainted resource outside of a circle still has a size.
+        self.mentioned(name).1.contains(name)
+    }
+
+    /// Parameters that decide the size of a resource, by themselves or through other resources.
+    pub fn sized_by(&self, name: &'a str) -> Vec<String> {
+        self.mentioned(name).0.into_iter().map(str::to_owned).collect()
+    }
+
+    /// Parameters and resources that the size of a resource is computed from, also through others.
+    fn mentioned(&self, name: &'a str) -> (BTreeSet<&'a str>, BTreeSet<&'a str>) {
+        let (mut params, mut seen) = (BTreeSet::new(), BTreeSet::new());
         let mut at = vec![name];
-        let mut seen = BTreeSet::new();
         while let Some(next) = at.pop() {
             let Some(resource) = self.linked.pipeline.resources.get(next) else { continue };
-            let mut names: Vec<&str> = Vec::new();
-            let exprs: Vec<&ExprAt> = match &resource.kind {
+            let mut names: Vec<&'a str> = Vec::new();
+            let exprs: Vec<&'a ExprAt> = match &resource.kind {
                 ResourceKind::Texture { size, mips, .. } => {
                     let mut exprs = Vec::new();
                     match size {
@@ -205,17 +215,16 @@ impl<'a, 'p> Sizes<'a, 'p> {
                 }
                 ResourceKind::Buffer { count, .. } => vec![count],
             };
-            names.extend(exprs.iter().flat_map(|e| &e.refs).filter(|r| r.kind != RefKind::Param).map(|r| r.name.text.as_str()));
-            for n in names {
-                if n == name {
-                    return true;
-                }
-                if seen.insert(n) {
-                    at.push(n);
+            for r in exprs.iter().flat_map(|e| &e.refs) {
+                if r.kind == RefKind::Param {
+                    params.insert(r.name.text.as_str());
+                } else {
+                    names.push(&r.name.text);
                 }
             }
+            at.extend(names.into_iter().filter(|n| seen.insert(*n)));
         }
-        false
+        (params, seen)
     }
 
     fn eval(&mut self, name: &str, what: &str, at: &'a ExprAt, out: &mut Vec<Diagnostic>) -> Option<u64> {

@@ -469,3 +469,27 @@ fn a_structure_has_one_layout() {
         &["`View` differs from that of the node `draw/paint`: member 1 is `near` instead of `far`", "scene.wgsl:1:8", "paint.wgsl:7:8"],
     );
 }
+
+/// Drivers crash when an invocation has no room for its variables.
+#[test]
+fn memory_that_an_invocation_cannot_have_is_refused_at_its_place() {
+    let main = "fn main(@builtin(global_invocation_id) id: vec3u) {";
+    let own = with("shaders/post/blur.wgsl", main, &format!("{main}\n    var huge: array<vec4f, 16777216>;\n    huge[id.x] = vec4f(1.0);"));
+    assert_faults(
+        &registry_faults(&own),
+        1,
+        &["`main` cannot be used in a node", "268435456 bytes", "put them into a buffer", "blur.wgsl:"],
+    );
+    let called =
+        "fn much(i: u32) -> f32 {\n    var huge: array<f32, 65536>;\n    return huge[i];\n}\n\n@compute @workgroup_size(8, 8)\nfn main(";
+    let called = with("shaders/post/blur.wgsl", "@compute @workgroup_size(8, 8)\nfn main(", called);
+    assert_faults(&registry_faults(&called), 1, &["`much` cannot be used in a node", "262144 bytes", "blur.wgsl:"]);
+    let private = with("shaders/post/blur.wgsl", "@compute", "var<private> huge: array<f32, 65536>;\n\n@compute");
+    let private = {
+        let mut files = private;
+        let (_, text) = files.iter_mut().find(|(name, _)| name == "shaders/post/blur.wgsl").unwrap();
+        *text = text.replace(main, &format!("{main}\n    huge[id.x] = 1.0;"));
+        files
+    };
+    assert_faults(&registry_faults(&private), 1, &["`main` cannot be used in a node", "262144 bytes"]);
+}
