@@ -249,6 +249,14 @@ impl Renderer {
         Ok(Self { gpu: gpu.clone(), documents, hosts, settings, scene, frame, last_time: None, first: 0 })
     }
 
+    /// The same pipeline, scene and settings on another device, from its first frame: for when the device was lost.
+    ///
+    /// # Errors
+    /// The plan does not fit the device.
+    pub fn on(&self, gpu: &Gpu) -> Result<Self, RenderError> {
+        Self::with(gpu, self.documents.clone(), self.scene.source.clone(), Scene::clone(self.scene()), self.settings.clone())
+    }
+
     /// Renders the scene at a time in seconds. Returns when the frame is submitted, not when it is done.
     ///
     /// Where objects that deform have more triangles than was foreseen, buffers grow and the plan is made anew, which takes as long as the
@@ -258,6 +266,15 @@ impl Renderer {
     /// A host node failed, the scene outgrew the device, or the device is lost. With [`Debug::watch_numbers`] also that the frame has bad numbers;
     /// for this alone it waits for the GPU.
     pub fn render_frame(&mut self, time: f64) -> Result<(), RenderError> {
+        let rendered = self.try_frame(time);
+        // What fails on a lost device, and that nothing seems to fail, follows from that.
+        match self.gpu.lost() {
+            Some(reason) => Err(RunError::Lost(reason).into()),
+            None => rendered,
+        }
+    }
+
+    fn try_frame(&mut self, time: f64) -> Result<(), RenderError> {
         let frame = gpu_data::Frame {
             index: (self.frame.index() - self.first.min(self.frame.index())) as u32,
             seed: self.settings.seed,
@@ -422,6 +439,9 @@ impl Renderer {
         scene: Option<Scene>,
         settings: Option<Settings>,
     ) -> Result<ReloadReport, Diagnostics> {
+        if let Some(reason) = self.gpu.lost() {
+            return Err(Diagnostics(vec![Diagnostic::error_nowhere(Fault::Lost { reason }.to_string())]));
+        }
         let new_settings = settings.as_ref().unwrap_or(&self.settings);
         let new_documents = documents.as_ref().unwrap_or(&self.documents);
         let time = self.last_time.unwrap_or(0.0) as f32;

@@ -106,6 +106,10 @@ pub fn execute(gpu: &Gpu, prepared: &Prepared, options: Options<'_>, on: &mut dy
                 known.insert(record.run.clone(), record);
             }
             Err(SweepError::File(fault)) => return Err(fault.into()),
+            Err(fault) if gpu.lost().is_some() => {
+                // The other runs would fail as well.
+                return Err(SweepError::Render(format!("{fault}; the runs that are done are kept, and the same command does the others")));
+            }
             Err(fault) => {
                 outcome.failed += 1;
                 on(Event::Failed { run, reason: &fault.to_string() });

@@ -14,25 +14,20 @@ use manylight::{
 use super::{
     note,
     outputs::Outputs,
-    session::{Session, bad_numbers, settings, time_of},
+    session::{Session, bad_numbers, of_render, settings, time_of},
 };
 use crate::cli::{Cli, WatchArgs};
 
 /// How long to wait for a change before looking again.
 const PATIENCE: Duration = Duration::from_secs(3600);
 
+/// Times to wait before a device is asked for once more: a driver that is reset needs a moment.
+const WAITS: [Duration; 4] = [Duration::ZERO, Duration::from_millis(500), Duration::from_secs(2), Duration::from_secs(5)];
+
 /// Renders once, then after every change until interrupted.
 pub fn run(cli: &Cli, args: &WatchArgs) -> Result<(), Fault> {
-    let outputs = Outputs { pictures: args.out.clone(), dumps: Vec::new() };
-    outputs.check_files(None)?;
-    let session = Session::open(cli, &args.pipeline.pipeline)?;
-    let scene = session.scene(&args.frame.scene)?;
-    let settings = settings(&args.pipeline, &args.frame, Vec::new())?;
-    outputs.check_plan(&session.plan(Some(&scene), &settings)?)?;
-    let gpu = super::open_gpu(args.frame.adapter.as_ref())?;
-    let renderer = session.renderer(&gpu, scene, settings)?;
-    let mut watcher = Watcher::new(renderer.watch_set()).map_err(|e| Fault::Input(e.to_string()))?;
-    let mut watch = Watch { args, outputs, renderer, frame: 0, pictures: 0 };
+    let mut watch = open(cli, args)?;
+    let mut watcher = Watcher::new(watch.renderer.watch_set()).map_err(|e| Fault::Input(e.to_string()))?;
     let start = Instant::now();
     watch.picture(args.frames)?;
     let files = watcher_files(&watch.renderer);
@@ -42,10 +37,23 @@ pub fn run(cli: &Cli, args: &WatchArgs) -> Result<(), Fault> {
         if changed.is_empty() {
             continue;
         }
-        watch.follow(&changed)?;
+        watch.follow(&changed);
         watcher.set(watch.renderer.watch_set()).map_err(|e| Fault::Input(e.to_string()))?;
     }
     Ok(())
+}
+
+/// Everything up to the first picture.
+fn open<'a>(cli: &Cli, args: &'a WatchArgs) -> Result<Watch<'a>, Fault> {
+    let outputs = Outputs { pictures: args.out.clone(), dumps: Vec::new() };
+    outputs.check_files(None)?;
+    let session = Session::open(cli, &args.pipeline.pipeline)?;
+    let scene = session.scene(&args.frame.scene)?;
+    let settings = settings(&args.pipeline, &args.frame, Vec::new())?;
+    outputs.check_plan(&session.plan(Some(&scene), &settings)?)?;
+    let gpu = super::open_gpu(args.frame.adapter.as_ref())?;
+    let renderer = session.renderer(&gpu, scene, settings)?;
+    Ok(Watch { args, outputs, renderer, frame: 0, pictures: 0 })
 }
 
 struct Watch<'a> {
@@ -75,11 +83,48 @@ impl Watch<'_> {
         Ok(())
     }
 
-    /// Takes over a change: the picture is written after one frame, and again when the iterative parts have settled.
-    fn follow(&mut self, changed: &[PathBuf]) -> Result<(), Fault> {
+    /// Opens a new device if the old one is lost.
+    fn recover(&mut self) -> Result<(), Fault> {
+        let Some(reason) = self.renderer.gpu().lost() else { return Ok(()) };
+        note(&format!("the GPU was lost: {reason}; opening it again"));
+        let mut last = None;
+        for wait in WAITS {
+            std::thread::sleep(wait);
+            match super::open_gpu(self.args.frame.adapter.as_ref()) {
+                Ok(gpu) => {
+                    self.renderer = self.renderer.on(&gpu).map_err(of_render)?;
+                    return Ok(());
+                }
+                Err(fault) => last = Some(fault),
+            }
+        }
+        last.map_or(Ok(()), Err)
+    }
+
+    /// Renders frames and writes the last; once more on a new device when the one there is gets lost.
+    fn picture_or_recover(&mut self, frames: u32) -> Result<(), Fault> {
+        match self.picture(frames) {
+            Err(_) if self.renderer.gpu().lost().is_some() => {
+                self.recover()?;
+                self.picture(self.args.frames)
+            }
+            done => done,
+        }
+    }
+
+    /// Takes over a change: the picture is written after one frame, and again when the iterative parts have settled. What fails is told: the next
+    /// change may mend it.
+    fn follow(&mut self, changed: &[PathBuf]) {
+        if let Err(fault) = self.try_follow(changed) {
+            note(&fault.render());
+        }
+    }
+
+    fn try_follow(&mut self, changed: &[PathBuf]) -> Result<(), Fault> {
         let saved = saved_at(changed);
         let names: Vec<String> = changed.iter().map(|path| shown(path)).collect();
         note(&format!("changed: {}", names.join(", ")));
+        self.recover()?;
         let report = match self.renderer.reload(changed) {
             Ok(report) => report,
             Err(faults) => {
@@ -87,18 +132,12 @@ impl Watch<'_> {
                 return Ok(());
             }
         };
-        if let Err(fault) = self.outputs.check_plan(self.renderer.plan()).and_then(|()| self.picture(1)) {
-            // A host node or the disk: the next change may mend it.
-            note(&fault.render());
-            return Ok(());
-        }
+        self.outputs.check_plan(self.renderer.plan())?;
+        self.picture_or_recover(1)?;
         let took = saved.elapsed().unwrap_or(report.took);
         note(&describe(&report, took));
-        if self.args.frames > 1
-            && let Err(fault) = self.picture(self.args.frames - 1)
-        {
-            note(&fault.render());
-            return Ok(());
+        if self.args.frames > 1 {
+            self.picture_or_recover(self.args.frames - 1)?;
         }
         self.pictures += 1;
         Ok(())
@@ -148,7 +187,50 @@ fn watcher_files(renderer: &Renderer) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
+    use clap::Parser;
+
     use super::*;
+    use crate::cli::Command;
+
+    const NODE: &str = r#"Node(doc: "Paints.", outputs: {"picture": Texture(format: Rgba8Unorm, doc: "colour")}, steps: [(entry: "fill", over: Texels("picture"))])"#;
+    const SHADER: &str = "@group(0) @binding(0) var picture: texture_storage_2d<rgba8unorm, write>;
+        @compute @workgroup_size(8, 8) fn fill(@builtin(global_invocation_id) id: vec3u) { textureStore(picture, id.xy, vec4f(0.2)); }";
+    const PIPELINE: &str = r#"Pipeline(doc: "Paints.", resources: {"picture": Texture(format: Rgba8Unorm, size: Output)},
+        nodes: [(id: "fill", node: "test/fill")], presents: "picture")"#;
+
+    /// The device is taken away between two changes, and again while a picture is made.
+    #[test]
+    fn a_lost_device_is_opened_again() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let at = |name: &str| folder.path().join(name);
+        for (name, text) in [("shaders/test/fill.ron", NODE), ("shaders/test/fill.wgsl", SHADER), ("pipelines/test.ron", PIPELINE)] {
+            fs::create_dir_all(at(name).parent().expect("a folder")).expect("creatable");
+            fs::write(at(name), text).expect("writable");
+        }
+        let (root, out) = (at("").display().to_string(), at("x.png").display().to_string());
+        let line = ["manylight", "--root", &root, "watch", "test", "--scene", "cornell", "--size", "16x16", "--frames", "2", "--out", &out];
+        let cli = Cli::try_parse_from(line).expect("a command line");
+        let Command::Watch(args) = &cli.command else { panic!("watch") };
+        let mut watch = open(&cli, args).unwrap_or_else(|fault| panic!("{}", fault.render()));
+        watch.picture(1).expect("a picture");
+        let picture = || fs::read(at("x.png")).expect("a picture");
+        let first = picture();
+
+        watch.renderer.gpu().device().destroy();
+        fs::write(at("shaders/test/fill.wgsl"), SHADER.replace("0.2", "0.8")).expect("writable");
+        watch.follow(&[at("shaders/test/fill.wgsl")]);
+        assert!(watch.renderer.gpu().lost().is_none() && watch.pictures == 1);
+        assert!(picture() != first, "the change is in the picture");
+
+        fs::write(at("shaders/test/fill.wgsl"), SHADER).expect("writable");
+        watch.follow(&[at("shaders/test/fill.wgsl")]);
+        fs::remove_file(at("x.png")).expect("there");
+        watch.renderer.gpu().device().destroy();
+        watch.picture_or_recover(1).expect("a picture on a new device");
+        assert_eq!(picture(), first);
+    }
 
     #[test]
     fn a_file_that_was_moved_was_not_saved_when_it_was_written() {
