@@ -291,7 +291,12 @@ pub fn append(file: &Path, record: &Record) -> Result<(), FileError> {
     let failed = |e: &std::io::Error| FileError::write(file, e);
     let line = line(record).map_err(|e| failed(&e))?;
     let mut out = OpenOptions::new().create(true).append(true).open(file).map_err(|e| failed(&e))?;
-    out.write_all(line.as_bytes()).and_then(|()| out.sync_data()).map_err(|e| failed(&e))
+    let whole = out.metadata().map_err(|e| failed(&e))?.len();
+    out.write_all(line.as_bytes()).and_then(|()| out.sync_data()).map_err(|e| {
+        // No half of a line stays. Should that fail as well, the next run tells of the line and leaves it out.
+        let _ = out.set_len(whole);
+        failed(&e)
+    })
 }
 
 /// Replaces a file by these records and lines of other formats.

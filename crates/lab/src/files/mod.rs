@@ -15,7 +15,7 @@ use thiserror::Error;
 pub use exr_file::{read_exr, write_exr};
 pub use picture::{Picture, Tone};
 pub use png_file::{read_png, write_png};
-pub use whole::{check_writable, write_text, write_whole};
+pub use whole::{Output, check_writable, write_text, write_whole};
 
 /// Kinds of output files, by extension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,9 +91,15 @@ pub enum FileError {
 }
 
 impl FileError {
-    /// A failed write.
+    /// A failed write, with what to do about it where that is known.
     pub fn write(path: &Path, reason: &io::Error) -> Self {
-        Self::Write { path: path.to_owned(), reason: reason.to_string() }
+        let remedy = match reason.kind() {
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "; make room on the disk, or write to another one",
+            io::ErrorKind::FileTooLarge => "; the limit on the size of files (`ulimit -f`) or the file system does not allow more",
+            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => "; write to a folder in which you may",
+            _ => "",
+        };
+        Self::Write { path: path.to_owned(), reason: format!("{reason}{remedy}") }
     }
 
     /// A failed read.
