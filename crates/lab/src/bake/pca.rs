@@ -23,9 +23,12 @@ pub struct Pca {
 
 impl Pca {
     /// Components of frames of equal length. All that are more than rounding are found; there are at most as many as frames. `subtract_mean` takes the mean
-    /// of the frames off first.
+    /// of the frames off first. Of no frame there is nothing.
     pub fn of(frames: &[&[f32]], subtract_mean: bool) -> Self {
-        let values = frames.first().map_or(0, |frame| frame.len());
+        let Some(first) = frames.first() else {
+            return Self { mean: Vec::new(), components: Vec::new(), weights: Vec::new(), kept: Vec::new() };
+        };
+        let values = first.len();
         let mut mean = vec![0.0_f32; values];
         if subtract_mean {
             for (i, mean) in mean.iter_mut().enumerate() {
@@ -160,6 +163,37 @@ mod tests {
         let k = pca.components_for(0.95);
         assert!(pca.kept[k - 1] >= 0.95 && (k == 1 || pca.kept[k - 2] < 0.95));
         assert_eq!(pca.components_for(2.0), pca.kept.len());
+    }
+
+    /// Frames among which the components are none, fewer than frames, or rounding.
+    #[test]
+    fn frames_that_repeat_are_given_back_exactly() {
+        let (a, b): (Vec<f32>, Vec<f32>) = ((0..50).map(|i| i as f32 * 0.25).collect(), (0..50).map(|i| 12.0 - i as f32 * 0.5).collect());
+        let black = vec![0.0; 50];
+        let cases: [(&str, Vec<&[f32]>); 7] = [
+            ("one frame", vec![&a]),
+            ("one black frame", vec![&black]),
+            ("black frames", vec![&black, &black, &black]),
+            ("equal frames", vec![&a, &a, &a]),
+            ("two equal of three", vec![&a, &b, &a]),
+            ("two pairs", vec![&a, &b, &a, &b]),
+            ("no frame", vec![]),
+        ];
+        for (what, frames) in cases {
+            for subtract_mean in [true, false] {
+                let pca = Pca::of(&frames, subtract_mean);
+                assert!(pca.components.len() <= 2 && pca.kept.len() == pca.components.len(), "{what}: {} components", pca.components.len());
+                assert!(pca.components.iter().flatten().chain(&pca.mean).all(|v| v.is_finite()), "{what}");
+                assert!(pca.weights.iter().flatten().chain(&pca.kept).all(|v| v.is_finite()), "{what}");
+                for (i, frame) in frames.iter().enumerate() {
+                    // More components than there are is all of them.
+                    let back = pca.reconstruct(i, 100);
+                    let worst = back.iter().zip(*frame).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                    // Values up to 12.5 and a component, each rounded to 24 bits.
+                    assert!(worst < 1e-5, "{what}, frame {i}: {worst}");
+                }
+            }
+        }
     }
 
     #[test]
