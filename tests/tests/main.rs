@@ -7,6 +7,8 @@ mod clustering;
 mod deforming;
 mod determinism;
 mod energy;
+mod faults;
+mod fuzz;
 mod gather;
 mod incremental;
 mod light_kinds;
