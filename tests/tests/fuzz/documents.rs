@@ -160,7 +160,7 @@ fn pipelines_are_planned_or_refused_with_a_reason() {
         })
         .collect();
     let mut index = 0_u64;
-    fuzz("pipelines", 4000, BOUND, move |random: &mut Random| {
+    fuzz("pipelines", 3000, BOUND, move |random: &mut Random| {
         let (top, sources) = random.of(&tops);
         let changed = random.of(sources).clone();
         let text = ron(text_of(&changed), text_of(random.of(&documents)), random);
@@ -173,7 +173,7 @@ fn pipelines_are_planned_or_refused_with_a_reason() {
 fn declarations_of_nodes_are_accepted_whole_or_refused_with_a_reason() {
     let nodes: Vec<&str> = paths(|name| name.starts_with("shaders/") && name.ends_with(".ron"));
     let common = paths(|name| name.starts_with("shaders/common/"));
-    fuzz("nodes", 250, BOUND, move |random: &mut Random| {
+    fuzz("nodes", 150, BOUND, move |random: &mut Random| {
         let changed = *random.of(&nodes);
         let shader = changed.replace(".ron", ".wgsl");
         let text = ron(text_of(changed), text_of(random.of(&nodes)), random);

@@ -15,11 +15,16 @@ fn number(variable: &str) -> Option<u64> {
     env::var(variable).ok()?.parse().ok()
 }
 
+/// How many times as many cases as usual are to be tried.
+pub fn times() -> u64 {
+    number("MANYLIGHT_FUZZ").unwrap_or(1)
+}
+
 /// Runs cases in a thread of their own. Each is a failure when it panics, and when it takes longer than `bound`.
 pub fn fuzz(name: &'static str, count: u64, bound: Duration, mut case: impl FnMut(&mut Random) + Send + 'static) {
     let cases = match number("MANYLIGHT_FUZZ_CASE") {
         Some(only) => only..only + 1,
-        None => 0..count * number("MANYLIGHT_FUZZ").unwrap_or(1),
+        None => 0..count * times(),
     };
     let (tell, told) = channel();
     let worker = thread::spawn(move || {

@@ -120,7 +120,7 @@ fn edited_shaders_are_shown_or_refused_with_a_reason_and_mended_ones_give_the_sa
     let library = Arc::new(copy_of_library());
     let gpu = Gpu::new(&GpuOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let mut benches: Vec<Bench> = ["acrsm", "rsm_gather", "instant_radiosity"].map(|name| Bench::new(&gpu, library.path(), name)).into();
-    fuzz("shaders", 24, BOUND, move |random: &mut Random| {
+    fuzz("shaders", 20, BOUND, move |random: &mut Random| {
         let _folder = &library;
         let at = random.below(benches.len());
         benches[at].edit(&gpu, random);

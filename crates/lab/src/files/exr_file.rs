@@ -1,24 +1,37 @@
 //! OpenEXR: 32-bit float channels, ZIP-compressed scan lines; any channel names when reading.
 
-use std::{fs::File, io::BufReader, path::Path};
+use std::{
+    fs::File,
+    io::{BufReader, Seek},
+    path::Path,
+};
 
-use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels, ReadLayers, WritableImage, read,
+use exr::{
+    meta::MetaData,
+    prelude::{
+        AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels, ReadLayers, WritableImage, read,
+    },
 };
 
 use super::{FileError, Picture, Tone, write_whole};
 
+/// No picture is larger, in pixels a side.
+const MOST_SIDE: usize = 1 << 16;
+
 /// Reads the first layer of an EXR file with all its channels, in the order of the file (by name).
 pub fn read_exr(path: &Path) -> Result<Picture, FileError> {
-    let file = File::open(path).map_err(|e| FileError::read(path, e))?;
+    let not_usable = |e: exr::error::Error| FileError::read(path, format!("not an EXR file that can be used ({e})"));
+    let mut file = BufReader::new(File::open(path).map_err(|e| FileError::read(path, e))?);
+    check_size(&MetaData::read_from_buffered(&mut file, false).map_err(not_usable)?).map_err(|reason| FileError::read(path, reason))?;
+    file.rewind().map_err(|e| FileError::read(path, e))?;
     let image = read()
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
         .first_valid_layer()
         .all_attributes()
-        .from_buffered(BufReader::new(file))
-        .map_err(|e| FileError::read(path, format!("not an EXR file that can be used ({e})")))?;
+        .from_buffered(file)
+        .map_err(not_usable)?;
     let layer = image.layer_data;
     let (width, height) = (layer.size.width(), layer.size.height());
     let list = layer.channel_data.list;
@@ -33,6 +46,20 @@ pub fn read_exr(path: &Path) -> Result<Picture, FileError> {
         }
     }
     Ok(Picture { width, height, names: list.iter().map(|c| c.name.to_string()).collect(), data, tone: Tone::Linear })
+}
+
+/// Refuses what does not fit into memory, before it is asked for in earnest: a damaged file may claim any size.
+fn check_size(meta: &MetaData) -> Result<(), String> {
+    for header in &meta.headers {
+        let (width, height, channels) = (header.layer_size.width(), header.layer_size.height(), header.channels.list.len());
+        let numbers = width.checked_mul(height).and_then(|n| n.checked_mul(channels));
+        // As read, and as returned.
+        let fits = numbers.and_then(|n| n.checked_mul(2)).is_some_and(|n| Vec::<f32>::new().try_reserve_exact(n).is_ok());
+        if !fits || width > MOST_SIDE || height > MOST_SIDE {
+            return Err(format!("it says that it has {width}×{height} pixels of {channels} channels, which do not fit into memory"));
+        }
+    }
+    Ok(())
 }
 
 /// Writes a picture's channels under their names as 32-bit floats.
@@ -75,6 +102,24 @@ mod tests {
         let back = read_exr(&path).expect("readable");
         assert_eq!(back.names, ["Y"]);
         assert!(back.data[0].is_infinite() && back.data[1].is_nan());
+    }
+
+    /// The process ended when memory for such a picture was asked for.
+    #[test]
+    fn a_damaged_size_is_an_error() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("x.exr");
+        write_exr(&path, &Picture::linear(40, 20, 3, vec![0.5; 40 * 20 * 3])).expect("writable");
+        let bytes = std::fs::read(&path).expect("readable");
+        let name = b"dataWindow\0box2i\0";
+        let window = bytes.windows(name.len()).position(|part| part == name).expect("a header") + name.len() + 4;
+        for (place, side) in [(8, 0x0fff_ffff_u32), (8, 0x7fff_ffff), (12, 0x00ff_ffff), (8, 70_000)] {
+            let mut damaged = bytes.clone();
+            damaged[window + place..window + place + 4].copy_from_slice(&side.to_le_bytes());
+            std::fs::write(&path, damaged).expect("writable");
+            let error = read_exr(&path).expect_err("damaged").to_string();
+            assert!(error.contains("x.exr") && error.contains("cannot read"), "{error}");
+        }
     }
 
     #[test]
