@@ -73,6 +73,9 @@ fn include_edge(r: Rectangle, a: vec3f, b: vec3f) -> Rectangle {
 // between the two points where its other edges come down to it.
 fn above_horizon(a: vec3f, b: vec3f, c: vec3f) -> Rectangle {
     var r = Rectangle(vec2f(1.0), vec2f(-1.0));
+    if max(a.z, max(b.z, c.z)) <= 0.0 {
+        return r;
+    }
     var landing = vec3f(0.0);
     var p = c;
     var q = a;
@@ -81,7 +84,8 @@ fn above_horizon(a: vec3f, b: vec3f, c: vec3f) -> Rectangle {
             p = q;
             q = select(c, b, edge == 1u);
         }
-        if max(p.z, q.z) <= 0.0 {
+        // A corner on the horizon counts as above: an edge along the horizon is an arc of the circle, which goes beyond its ends.
+        if max(p.z, q.z) < 0.0 {
             continue;
         }
         if min(p.z, q.z) >= 0.0 {
