@@ -5,9 +5,9 @@ fn sign_not_zero(v: vec2f) -> vec2f {
     return select(vec2f(-1.0), vec2f(1.0), v >= vec2f(0.0));
 }
 
-// Unit vector to the square [-1, 1]². Scales by the largest component first, so that no length over- or underflows.
+// Unit vector to the square [-1, 1]². Zero, which has no direction, becomes that of +z.
 fn octahedral_encode(unit: vec3f) -> vec2f {
-    let p = unit.xy / (abs(unit.x) + abs(unit.y) + abs(unit.z));
+    let p = unit.xy / max(abs(unit.x) + abs(unit.y) + abs(unit.z), 1e-37);
     return select((1.0 - abs(p.yx)) * sign_not_zero(p), p, unit.z >= 0.0);
 }
 
