@@ -8,6 +8,7 @@ mod deforming;
 mod determinism;
 mod energy;
 mod faults;
+mod functions;
 mod fuzz;
 mod gather;
 mod incremental;
