@@ -334,7 +334,7 @@ impl View {
         let v = position - self.origin;
         let (x, y, z) = (v.dot(self.right), v.dot(self.up), v.dot(self.forward));
         // No direction: rounding decides how far it is.
-        if z.abs() < 1e-5 * v.length() {
+        if z.abs() <= 1e-5 * v.length() {
             return vec![Want::finite(), Want::finite(), Want::of(z, v.length())];
         }
         let seen = |side: f64, tan: f64, sign: f64| {

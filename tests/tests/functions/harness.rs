@@ -125,7 +125,7 @@ pub const fn relative(limit: f64, reason: &'static str) -> Bound {
 pub struct Resource {
     name: &'static str,
     kind: Kind,
-    /// The type of the global that the shader around the function declares; without it, the function's module does.
+    /// The global that the shader around the function declares; without it, the function's module does.
     declared: Option<&'static str>,
 }
 
@@ -152,8 +152,9 @@ impl Resource {
     /// A texture; its levels one after another.
     pub fn texture<T: bytemuck::Pod>(name: &'static str, format: Format, size: (u32, u32), levels: &[Vec<T>]) -> Self {
         let bytes = levels.iter().flat_map(|level| bytemuck::cast_slice::<T, u8>(level).to_vec()).collect();
+        let of = if format == Format::R32Uint { "texture_2d<u32>" } else { "texture_2d<f32>" };
         let kind = Kind::Texture { format, array: false, size, layers: vec![bytes], mips: levels.len() as u32 };
-        Self { name, kind, declared: Some(if format == Format::R32Uint { "texture_2d<u32>" } else { "texture_2d<f32>" }) }
+        Self { name, kind, declared: Some(String::leak(format!("var {name}: {of}"))) }
     }
 
     /// An array of textures with one level, which the function's module declares.
@@ -162,9 +163,14 @@ impl Resource {
         Self { name, kind: Kind::Texture { format, array: true, size, layers, mips: 1 }, declared: None }
     }
 
+    /// Declared by the shader around the function, as this: `var<uniform> scene_info: SceneInfo`.
+    pub fn declared(self, global: &'static str) -> Self {
+        Self { declared: Some(global), ..self }
+    }
+
     /// The sampler of that name, for functions that take one.
     pub fn sampler(name: &'static str) -> Self {
-        Self { name, kind: Kind::Sampler, declared: Some("sampler") }
+        Self { name, kind: Kind::Sampler, declared: Some(String::leak(format!("var {name}: sampler"))) }
     }
 
     fn port(&self) -> Option<(PortKind, String)> {
@@ -218,6 +224,7 @@ pub struct Case {
     resources: Vec<Resource>,
     edges: Vec<Vec<f64>>,
     random: Vec<Numbers>,
+    count: usize,
     twin: Twin,
     bound: Bound,
 }
@@ -235,6 +242,7 @@ impl Case {
             resources: Vec::new(),
             edges: Vec::new(),
             random: Vec::new(),
+            count: RANDOM_INPUTS,
             twin: Box::new(|_| Vec::new()),
             bound: EXACT,
         }
@@ -283,6 +291,11 @@ impl Case {
         self
     }
 
+    /// How many of them, where the twin takes long.
+    pub fn count(self, count: usize) -> Self {
+        Self { count, ..self }
+    }
+
     /// What it must return, and how exactly.
     pub fn twin(self, bound: Bound, twin: impl Fn(&[f64]) -> Vec<Want> + Send + Sync + 'static) -> Self {
         Self { twin: Box::new(twin), bound, ..self }
@@ -291,7 +304,7 @@ impl Case {
     /// Arguments as the shader gets them, and as exact numbers.
     fn inputs(&self) -> (Vec<u32>, Vec<Vec<f64>>) {
         let mut all = self.edges.clone();
-        all.extend(self.random.iter().flat_map(|strategy| draw(strategy, RANDOM_INPUTS)));
+        all.extend(self.random.iter().flat_map(|strategy| draw(strategy, self.count)));
         let kinds: Vec<bool> = self.takes.iter().flat_map(|(_, of)| vec![is_float(of); width(of)]).collect();
         let mut words = Vec::with_capacity(all.len() * kinds.len());
         for input in &mut all {
@@ -319,8 +332,8 @@ impl Case {
         text.push_str("@group(0) @binding(1) var<storage, read_write> results: array<u32>;\n");
         text.push_str("@group(0) @binding(2) var picture: texture_storage_2d<rgba32float, write>;\n");
         for (binding, resource) in (3..).zip(&self.resources) {
-            if let Some(of) = resource.declared {
-                writeln!(text, "@group(0) @binding({binding}) var {}: {of};", resource.name).expect("a string");
+            if let Some(global) = resource.declared {
+                writeln!(text, "@group(0) @binding({binding}) {global};").expect("a string");
             }
         }
         let (takes, gives) =
@@ -462,6 +475,13 @@ impl Outcome {
         }
     }
 
+    fn join(&mut self, other: Self) {
+        self.inputs += other.inputs;
+        if other.worst > self.worst {
+            (self.worst, self.worst_call) = (other.worst, other.worst_call);
+        }
+    }
+
     /// Whether the worst error is within the bound.
     pub fn is_good(&self) -> bool {
         self.inputs > 0 && self.worst <= self.bound.limit
@@ -588,7 +608,15 @@ const RECORD_FOLDER: &str = "MANYLIGHT_RECORD_NUMBERS";
 
 /// Calls and compares all of them; fails with everything that is beyond its bound.
 pub fn check(cases: Vec<Case>) {
-    judge(cases.iter().map(|case| case.measure_with(None)).collect());
+    let mut outcomes: Vec<Outcome> = Vec::new();
+    for outcome in cases.iter().map(|case| case.measure_with(None)) {
+        // A function that reads something may have a case for each of several things to read.
+        match outcomes.iter_mut().find(|known| known.function == outcome.function) {
+            Some(known) => known.join(outcome),
+            None => outcomes.push(outcome),
+        }
+    }
+    judge(outcomes);
 }
 
 /// Records outcomes, and fails with everything that is beyond its bound.
