@@ -301,6 +301,18 @@ impl Case {
         Self { twin: Box::new(twin), bound, ..self }
     }
 
+    /// With a twin that is wrong by four times the bound, or four units where there is none.
+    pub fn with_wrong_twin(mut self) -> Self {
+        let Bound { limit, unit, .. } = self.bound;
+        let twin = std::mem::replace(&mut self.twin, Box::new(|_| Vec::new()));
+        let off = move |want: Want| match want {
+            Want::Value { value, scale } => Want::of(value + 4.0 * if limit > 0.0 { limit } else { 1.0 } * unit.size(scale), scale),
+            other => other,
+        };
+        self.twin = Box::new(move |input| twin(input).into_iter().map(off).collect());
+        self
+    }
+
     /// Arguments as the shader gets them, and as exact numbers.
     fn inputs(&self) -> (Vec<u32>, Vec<Vec<f64>>) {
         let mut all = self.edges.clone();
@@ -544,6 +556,20 @@ impl World {
             let text = fs::read_to_string(root().join(&path)).unwrap_or_else(|e| panic!("{path}: {e}"));
             self.files.insert(path, text);
         }
+    }
+
+    /// A node `test/show` without inputs that gives the texture `picture`: for pipelines of buffers, which must present one.
+    pub fn add_picture(&mut self) {
+        self.add(
+            "shaders/test/show.ron",
+            "Node(doc: \"Nothing to see.\", outputs: {\"picture\": Texture(format: Rgba32Float, doc: \"black\")},
+            steps: [(entry: \"show\", over: Texels(\"picture\"))])",
+        );
+        self.add(
+            "shaders/test/show.wgsl",
+            "@group(0) @binding(0) var picture: texture_storage_2d<rgba32float, write>;
+            @compute @workgroup_size(1) fn show(@builtin(global_invocation_id) id: vec3u) { textureStore(picture, id.xy, vec4f(0.0)); }",
+        );
     }
 
     /// Changes a file.
