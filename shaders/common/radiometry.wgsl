@@ -80,7 +80,9 @@ fn reflected_light(albedo: vec3f, light: vec4f) -> vec4f {
 fn lambert_blinn(albedo: vec3f, specular: vec3f, shininess: f32, normal: vec3f, to_light: vec3f, to_viewer: vec3f) -> vec3f {
     var f = albedo / PI;
     if max_component(specular) > 0.0 {
-        let half = normalize(to_light + to_viewer);
+        // Opposite directions have no half vector: no lobe.
+        let sum = to_light + to_viewer;
+        let half = sum * inverseSqrt(max(dot(sum, sum), 1e-30));
         f += specular * ((shininess + 8.0) / (8.0 * PI) * pow(max(dot(normal, half), 0.0), max(shininess, 1.0)));
     }
     return f;

@@ -270,6 +270,8 @@ fn reflection() -> Vec<Case> {
             let (to_light, to_viewer) = (v3(&i[10..]), v3(&i[13..]));
             match lambert_blinn(albedo, specular, shininess, normal, to_light, to_viewer) {
                 Some((value, scale)) => (0..3).map(|k| Want::of(value[k], scale[k])).collect(),
+                // Opposite: no half vector, no lobe.
+                None if to_light == -to_viewer => values((albedo / PI).to_array()),
                 // Nearly opposite: no certain half vector; bounded by the lobe's peak.
                 None => {
                     let (lambert, peak) = (albedo / PI, albedo / PI + specular * (shininess + 8.0) / (8.0 * PI));
