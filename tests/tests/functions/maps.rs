@@ -195,7 +195,7 @@ fn rays() -> Vec<Case> {
         let scale = if view(index).1 == DIRECTIONAL { 40.0 } else { origin.length() };
         [values_of(origin.to_array(), scale), values_of(direction.to_array(), 1.0)].concat()
     };
-    let area = ulps(120.0, "the cube of a cosine down to 0.06 at the corners of a field of 170°");
+    let area = ulps(60.0, "the cube of a cosine down to 0.06 at the corners of a field of 170°");
     vec![
         case("rsm::ray_at", "texel: vec2u")
             .imports("rsm::place_of_texel")

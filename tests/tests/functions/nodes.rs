@@ -284,7 +284,7 @@ fn the_comparison_of_clusters_is_as_its_twin() {
         many(512, &|i| (20.0 * noise(i) - 10.0).exp(), &|i| noise(i + 999)),
         idle,
     ];
-    let mut outcome = Outcome::new("clustering/evaluate", relative(1e-4, "sums of up to 512 terms and of their squares, all of 0 or more"));
+    let mut outcome = Outcome::new("clustering/evaluate", relative(4e-6, "sums of up to 512 terms and of their squares, all of 0 or more"));
     for list in lists {
         let view = gpu_data::View::perspective(Vec3::ZERO, Vec3::Z, Vec3::Y, 1.0, 1.0, 0.1, 10.0);
         let views = [LightView { view, light: 0, kind: 0, face: 0, weight: 1.0 }];
@@ -430,7 +430,7 @@ fn soft_shadows_are_as_their_twin() {
     const BIAS: f64 = 0.12;
     let diagonal = 10.0_f32;
     let mut outcome =
-        Outcome::new("lighting/indirect (pcss)", absolute(2e-4, "a share of 16 taps; where rounding decides about one, any share is good"));
+        Outcome::new("lighting/indirect (pcss)", absolute(1e-6, "a share of 16 taps; where rounding decides about one, any share is good"));
     let receivers: Numbers = (unit_vector(), magnitude(0.05, 5.0), unit_vector())
         .prop_map(|(d, l, n)| {
             let direction = DVec3::new(d[0], d[1], d[2].abs().max(0.02)).normalize();
@@ -540,6 +540,80 @@ fn soft_shadows_are_as_their_twin() {
         }
     }
     assert!(2 * decided > facing && facing > COUNT, "{decided} of {facing} receivers are compared with a value");
+    judge(vec![outcome]);
+}
+
+/// [CV] 4.1: light of one disk behind a map that holds one depth everywhere, so that averages over any region are that of a texel.
+#[test]
+fn series_of_a_map_are_as_their_twin() {
+    const SIDE: usize = 64;
+    const COUNT: usize = 512;
+    const MARGIN: f64 = 1.0;
+    let info = SceneInfo { bounds_min: Vec3::splat(-1.0), bounds_max: Vec3::new(3.0, 2.0, 1.0), diagonal: 6.0, ..SceneInfo::default() };
+    let range = info.bounds_max.as_dvec3().length();
+    let mut outcome =
+        Outcome::new("lighting/indirect (cssm)", absolute(1e-3, "the series' terms are half floats, with errors of up to 1/4096"));
+    let cluster = Cluster { area: 0.01, normal: Vec3::Z, flux: Vec3::ONE, count: 1, state: 1, ..Cluster::zeroed() };
+    // Depths of the whole map: at the light, next to it, in the middle, almost and at the end of the range.
+    for z in [0.0, 1e-3, 0.25, 0.5, 0.999, 1.0] {
+        for (terms, slope) in [(4_u32, 0.0), (1, 0.0), (16, 0.0), (4, 1.0), (3, 2.0)] {
+            let margin = MARGIN / f64::from(2 * terms);
+            // From the light to the end of the range, and just where what is in front becomes nothing.
+            let depth = |i: usize| match i % 8 {
+                0 => (z + margin + 1e-3 * (noise(i as u32) - 0.5)).clamp(1e-3, 1.0),
+                1 => 1e-4 + 0.01 * noise(i as u32),
+                _ => 1e-3 + 0.999 * i as f64 / COUNT as f64,
+            };
+            let direction = |i: u32| DVec3::new(noise(3 * i) - 0.5, noise(3 * i + 1) - 0.5, 0.2 + noise(3 * i + 2)).normalize();
+            let directions: Vec<DVec3> = (0..COUNT as u32).map(direction).collect();
+            let places: Vec<Vec3> = directions.iter().enumerate().map(|(i, d)| (*d * depth(i) * range).as_vec3()).collect();
+            // Walls that are lit from the side and below.
+            let normals = directions.iter().map(|d| DVec3::new(-d.x, -d.y, 0.0).normalize());
+            let positions: Vec<f32> = places.iter().flat_map(|p| [p.x, p.y, p.z, 1.0]).collect();
+            let stored = (z * range / f64::from(info.diagonal)) as f32;
+            let size = (COUNT as u32, 1);
+            let mut world = World::new(vec![
+                Resource::texture("split_position", Format::Rgba32Float, size, &[positions]),
+                Resource::texture("split_normal", Format::R32Uint, size, &[normals.map(code).collect::<Vec<u32>>()]),
+                Resource::buffer("clusters", "Cluster", &[cluster]),
+                Resource::buffer("casters", "Cluster", &[cluster]),
+                Resource::buffer("caster_of", "u32", &[0_u32]),
+                Resource::texture("ism", Format::R32Float, (256, SIDE as u32), &[vec![stored; 256 * SIDE]]),
+                Resource::uniform("scene_info", "SceneInfo", &info),
+            ]);
+            world.add_node("lighting/indirect");
+            world.add_node("cssm/basis");
+            let resources = format!(
+                "\"split_light\": Texture(format: Rgba32Float, size: Fixed({COUNT}, 1)),
+                \"cssm\": Texture(format: Rgba16Float, size: Fixed(256, {}), mips: Count(7))",
+                SIDE as u32 * (2 * terms.div_ceil(2) + 1)
+            );
+            let shared = format!("\"terms\": {terms}, \"ism_size\": {SIDE}");
+            let nodes = format!(
+                "(id: \"basis\", node: \"cssm/basis\", params: {{{shared}}}), (id: \"indirect\", node: \"lighting/indirect\",
+                params: {{{shared}, \"tiles\": 1, \"atlas_width\": 256, \"visibility\": \"cssm\", \"cssm_margin\": {MARGIN:?}, \"cssm_slope\": {slope:?}}})"
+            );
+            world.add("pipelines/test.ron", &pipeline(&resources, &nodes, "split_light"));
+            let image = world.run("lighting/indirect", &[]).image("split_light");
+            for (place, got) in places.iter().zip(image.data.chunks_exact(4)) {
+                let got: Vec<f64> = got.iter().map(|v| f64::from(*v)).collect();
+                let shown = luminance(DVec3::new(got[0], got[1], got[2])) / got[3];
+                // [CSM]: the step function's series, over that of a surface which is compared with itself.
+                let step = |behind: f64| -> f64 {
+                    let frequencies = (1..=terms).map(|k| f64::from(2 * k - 1) * PI);
+                    0.5 + frequencies.map(|c| 2.0 / c * (c * behind).sin()).sum::<f64>()
+                };
+                let d = place.as_dvec3().length() / range - margin;
+                let wanted = match () {
+                    // Moved by the slope, what is compared is another depth: a share in any case.
+                    () if slope > 0.0 || d.abs() < 1e-5 => Want::Between(0.0, 1.000_01),
+                    () if d < 0.0 => Want::new(1.0),
+                    () => Want::new((step(z - d) / step(margin)).clamp(0.0, 1.0)),
+                };
+                outcome.add(&[wanted], &[shown], || format!("depth {z}, {terms} terms, slope {slope}: a receiver at {d} and the margin"));
+            }
+        }
+    }
     judge(vec![outcome]);
 }
 
