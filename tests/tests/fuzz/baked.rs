@@ -13,12 +13,13 @@ const CHECKSUM: usize = 32;
 
 fn good() -> Baked {
     let header = serde_json::json!({
-        "scene": "day", "scene_hash": "0123456789abcdef", "lookup": "image", "width": 3, "height": 2, "components": 2, "keys": [0.0, 21600.0, 64800.0],
+        "scene": "day", "scene_hash": "0123456789abcdef", "lookup": "image", "triangles": 0, "width": 3, "height": 2, "components": 2, "keys": [0.0, 21600.0, 64800.0],
         "period_s": 86400.0, "kept_variance": [0.9, 0.99], "mean_subtracted": true, "dark_keys": 1, "sky_scale": 2.5, "paths": 16, "manylight": "0.1.0",
     });
     let header: Header = serde_json::from_value(header).expect("a header");
     let count = header.layers() * header.width * header.height * 4;
-    Baked { weights: vec![0.5; header.keys.len() * header.columns()], texels: vec![half::f16::from_f32(0.25); count], header }
+    let weights = vec![0.5; header.keys.len() * header.columns()];
+    Baked { weights, texels: vec![half::f16::from_f32(0.25); count], corners: Vec::new(), header }
 }
 
 #[test]

@@ -21,7 +21,7 @@ use super::{
     check_faults,
     mutate::{Random, fuzz, wgsl},
 };
-use crate::{cli::copy_of_library, support::root};
+use crate::support::{copy_of_library, root};
 
 /// Compiling a pipeline takes seconds on a machine that does other things as well.
 const BOUND: Duration = Duration::from_secs(120);
