@@ -11,7 +11,7 @@ use proptest::strategy::Strategy;
 
 use super::{
     directions::v3,
-    harness::{Case, EXACT, Resource, Want, absolute, check, ulps, values, values_of},
+    harness::{Bound, Case, EXACT, Resource, Want, absolute, check, ulps, values, values_of},
     inputs::{LARGEST, Numbers, colour, index, join, magnitude, magnitude_or_zero, one_of, real, switch, unit_vector, vector},
 };
 
@@ -128,8 +128,7 @@ fn share(light: Light, direction: DVec3) -> Vec<Want> {
     vec![Want::OneOf(all.collect())]
 }
 
-const ANGLE: super::harness::Bound =
-    ulps(24.0, "of the angle, by an arc tangent that is good to some 1e-6, over the width of the penumbra");
+const ANGLE: Bound = ulps(24.0, "of the angle, by an arc tangent that is good to some 1e-6, over the width of the penumbra");
 
 fn lights() -> Vec<Case> {
     vec![

@@ -8,7 +8,7 @@ use proptest::strategy::Strategy;
 
 use super::{
     directions::{View, v3},
-    harness::{Case, EXACT, Resource, Want, check, ulps, values, values_of},
+    harness::{Bound, Case, EXACT, Resource, Want, check, ulps, values, values_of},
     inputs::{Numbers, index, join, magnitude, real, vector},
     light::{LIGHT, Light, MAKE_LIGHT, light},
 };
@@ -186,7 +186,7 @@ fn counts() -> Vec<Case> {
     ]
 }
 
-const RAY: super::harness::Bound = ulps(8.0, "a unit vector from three; a point of the square where parallel rays start");
+const RAY: Bound = ulps(8.0, "a unit vector from three; a point of the square where parallel rays start");
 
 fn rays() -> Vec<Case> {
     let wanted = |i: &[f64]| {

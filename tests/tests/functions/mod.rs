@@ -6,8 +6,10 @@ mod inputs;
 mod light;
 mod maps;
 mod nodes;
+mod paths;
 mod random;
 mod rays;
+mod scene;
 mod series;
 mod surface;
 
@@ -18,7 +20,7 @@ use harness::{Case, modules};
 use crate::support::root;
 
 fn cases() -> Vec<Case> {
-    [random::cases(), directions::cases(), light::cases(), series::cases(), maps::cases(), rays::cases(), surface::cases()]
+    [random::cases(), directions::cases(), light::cases(), series::cases(), maps::cases(), rays::cases(), paths::cases(), surface::cases()]
         .into_iter()
         .flatten()
         .collect()

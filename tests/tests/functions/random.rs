@@ -1,7 +1,7 @@
 //! Numbers that look random, low-discrepancy sequences, and whole-number arithmetic of indices.
 
 use super::{
-    harness::{Case, EXACT, Want, check, relative, ulps, values},
+    harness::{Bound, Case, EXACT, Want, check, relative, ulps, values},
     inputs::{index, join, word},
 };
 
@@ -80,7 +80,7 @@ pub fn cases() -> Vec<Case> {
     ]
 }
 
-const BASE_3: super::harness::Bound = ulps(
+const BASE_3: Bound = ulps(
     2.5,
     "digits are whole numbers up to 3¹⁵: both are rounded when they become floats at most once, and WGSL allows a quotient 2.5 ulp",
 );

@@ -73,9 +73,8 @@ fn depths() -> Vec<Case> {
     ]
 }
 
-/// Texels a side of the atlas that `series` and `fetch` read, and its maps, and slabs below each other.
+/// Texels a side of the atlas that `series` and `fetch` read, and slabs below each other.
 const ATLAS: u32 = 32;
-const MAP: u32 = 16;
 const SLABS: u32 = 4;
 
 /// Depths of the texels: ends of the range and others.

@@ -24,7 +24,7 @@ pub const DRAWN: &str = "surface::describe_surface";
 fn vertices() -> Vec<Vertex> {
     let at = |i: u32| {
         let f = |k: u32| (super::random::hash(16 * i + k) % 2001) as f32 / 1000.0 - 1.0;
-        let normal = if i % 4 == 0 { Vec3::ZERO } else { Vec3::new(f(3), f(4), f(5)).normalize_or(Vec3::Y) };
+        let normal = if i.is_multiple_of(4) { Vec3::ZERO } else { Vec3::new(f(3), f(4), f(5)).normalize_or(Vec3::Y) };
         Vertex { position: Vec3::new(f(0), f(1), f(2)), u: f(6), normal, v: f(7) }
     };
     (0..30).map(at).collect()
