@@ -370,6 +370,7 @@ fn midnight() -> Vec<Case> {
         lookup: Lookup::Image,
         width: WIDTH,
         height: WIDTH,
+        triangles: 0,
         components: 2,
         keys: vec![7200.0, 36_000.0, 79_200.0],
         period_s: 86_400.0,
@@ -384,9 +385,42 @@ fn midnight() -> Vec<Case> {
     let texels: Vec<f16> =
         (0..4 * WIDTH * WIDTH * 4).map(|i| f16::from_f64(f64::from(super::random::hash(i as u32) % 1000) / 500.0 - 0.5)).collect();
     let layers: Vec<Vec<f16>> = texels.chunks(4 * WIDTH * WIDTH).map(<[f16]>::to_vec).collect();
-    let baked = Baked { header, weights: weights.clone(), texels };
+    let baked = Baked { header, weights: weights.clone(), texels, corners: Vec::new() };
     let midnight = 86_400.0;
-    [
+    let now = baked.weights_at(50_000.0, 1.0);
+    let reads = [
+        Resource::buffer("baked_weights", "f32", &now),
+        Resource::texture_array("baked_light", Format::Rgba16Float, (WIDTH as u32, WIDTH as u32), &layers),
+    ];
+    let shown = layers.clone();
+    let others = [
+        Case::new("baked::baked_layers", "with_sky: bool")
+            .gives("u32")
+            .reads(&reads[..1])
+            .edges([vec![0.0], vec![1.0]])
+            .twin(EXACT, |i| values([3.0 + i[0]])),
+        Case::new("baked::baked_light_at", "place: vec2f, with_sky: bool")
+            .gives("vec3f")
+            .reads(&reads)
+            .edges([[0.0, 0.0], [16.0, 16.0], [0.5, 15.5], [8.5, 3.5], [8.0, 3.0]].map(|p| vec![p[0], p[1], 1.0]))
+            .random(join([real(0.0, WIDTH as f64), real(0.0, WIDTH as f64), switch()]))
+            .twin(
+                absolute(0.06, "devices interpolate between texels in steps of 1/256 of values that differ by up to 2, in four layers"),
+                move |i| {
+                    let side = WIDTH as f64;
+                    let texel = |layer: usize, x: f64, y: f64| {
+                        let at = 4 * (x.clamp(0.0, side - 1.0) as usize + WIDTH * y.clamp(0.0, side - 1.0) as usize);
+                        DVec3::from_array([0, 1, 2].map(|c| shown[layer][at + c].to_f64()))
+                    };
+                    let (x, y) = (i[0] - 0.5, i[1] - 0.5);
+                    let row = |layer: usize, y: f64| texel(layer, x.floor(), y).lerp(texel(layer, x.floor() + 1.0, y), x - x.floor());
+                    let light = |layer: usize| row(layer, y.floor()).lerp(row(layer, y.floor() + 1.0), y - y.floor());
+                    let sum: DVec3 = (0..3 + i[2] as usize).map(|layer| f64::from(now[layer]) * light(layer)).sum();
+                    values(sum.max(DVec3::ZERO).to_array())
+                },
+            ),
+    ];
+    let nights = [
         (79_200.0, 2, 0, 0.0),
         (midnight, 2, 0, 0.5),
         (0.0, 2, 0, 0.5),
@@ -394,7 +428,6 @@ fn midnight() -> Vec<Case> {
         (7199.0, 2, 0, 1.0 - 1.0 / 14_400.0),
         (7200.0, 0, 1, 0.0),
     ]
-    .into_iter()
     .map(|(time, before, after, alpha)| {
         let daylight = 0.25;
         let texel_layers = layers.clone();
@@ -415,8 +448,8 @@ fn midnight() -> Vec<Case> {
                 let sky = i[2] * 2.5 * daylight * light(3);
                 values(((1.0 - alpha) * of_key(from) + alpha * of_key(to) + sky).max(DVec3::ZERO).to_array())
             })
-    })
-    .collect()
+    });
+    nights.into_iter().chain(others).collect()
 }
 
 #[test]

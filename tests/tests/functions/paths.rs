@@ -2,7 +2,7 @@
 
 use std::{f64::consts::PI, sync::Arc};
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use manylight_scene::gpu_data::NO_TEXTURE;
 use proptest::strategy::Strategy;
 
@@ -10,7 +10,7 @@ use super::{
     directions::v3,
     harness::{Case, EXACT, Resource, Want, check, relative, ulps, values, values_of},
     inputs::{
-        ALMOST_ONE, Numbers, colour, direction, index, join, magnitude_or_zero, one_of, real, unit_interval, unit_vector, vector, word,
+        ALMOST_ONE, Numbers, colour, direction, index, join, magnitude_or_zero, real, switch, unit_interval, unit_vector, vector, word,
     },
     light::{LIGHT, Light, MAKE_LIGHT, light},
     scene::{
@@ -262,7 +262,7 @@ fn two_surfaces(function: &'static str, arguments: &str, of: fn(&Surface, &Surfa
 
 fn paths() -> Vec<Case> {
     let scene = world();
-    let [a, b, c] = std::array::from_fn(|_| Arc::clone(&scene));
+    let [a, b, c, d] = std::array::from_fn(|_| Arc::clone(&scene));
     let [nodes, triangles] = scene.hierarchy();
     let lit = [scene.scene_info(), nodes, triangles, scene.scene_lights()];
     let all = [lit.to_vec(), scene.geometry().to_vec()].concat();
@@ -306,9 +306,23 @@ fn paths() -> Vec<Case> {
         .before(String::leak(format!("{MAKE_SURFACE} {START}")))
         .also("vec3f", "gather(s, Gathered(lights, sky, bounces), vec3f(0.25))")
         .reads(&sky)
-        .random(join([surface(), seeds(), index(4), one_of(&[0.0, 1.0]), one_of(&[0.0, 1.0])]))
+        .random(join([surface(), seeds(), index(4), switch(), switch()]))
         .count(1024)
-        .twin(bound, move |i| near(c.gather(i))),
+        .twin(bound, move |i| near(c.gather(i, Ok((DVec3::splat(0.25), DVec3::splat(0.25)))))),
+        Case::new(
+            "path::light_of",
+            String::leak(format!("{SURFACE}, seed: u32, first: u32, path: u32, bounces: u32, lights: bool, sky: bool, with_direct: bool")),
+        )
+        .imports("path::{Surface, Gathered, start_paths, path_index}")
+        .before(String::leak(format!("{MAKE_SURFACE} {START}")))
+        .also("vec3f", "light_of(s, with_direct, Gathered(lights, sky, bounces))")
+        .reads(&sky)
+        .random(join([surface(), seeds(), index(4), switch(), switch(), switch()]))
+        .count(1024)
+        .twin(bound, move |i| {
+            let direct = if i[25] > 0.0 { d.direct(&Surface::of(i), |_| 1.0) } else { Ok((DVec3::ZERO, DVec3::ZERO)) };
+            near(d.gather(i, direct))
+        }),
     ]
 }
 

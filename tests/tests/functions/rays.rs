@@ -10,7 +10,7 @@ use super::{
     directions::v3,
     harness::{Case, EXACT, Resource, Want, absolute, check, relative, ulps, values},
     inputs::{Numbers, join, magnitude, one_of, real, unit_vector, vector},
-    scene::{MISSED, world},
+    scene::{MISSED, ray_offset, world},
 };
 
 /// All cases of this theme.
@@ -44,6 +44,13 @@ fn boxes() -> Vec<Case> {
                 };
                 values([i[0], i[1], i[2], i[3], i[4], i[5], inverse(i[3]), inverse(i[4]), inverse(i[5])])
             }),
+        Case::new("bvh::ray_offset", "low: vec3f, high: vec3f, diagonal: f32")
+            .imports("scene::SceneInfo")
+            .before("let info = SceneInfo(low, diagonal, high, 1.0, 1.0, 1.0, 1.0, 1.0, 0u, 0u, 0u, 0u);")
+            .also("f32", "ray_offset(info)")
+            .edges([vec![0.0; 7]])
+            .random(join([vector(1e-3, 1e6), vector(1e-3, 1e6), magnitude(1e-3, 1e5)]))
+            .twin(ulps(2.0, "a product"), |i| values([ray_offset(v3(i), v3(&i[3..]), i[6])])),
         Case::new("bvh::enter_box", "origin: vec3f, direction: vec3f, low: vec3f, extent: vec3f, limit: f32")
             .imports("bvh::make_ray")
             .also("f32", "enter_box(make_ray(origin, direction), low, low + extent, limit)")

@@ -236,7 +236,7 @@ impl World {
     }
 
     pub fn lift(&self, s: &Surface) -> DVec3 {
-        s.position + s.geometric * (2e-5 * f64::from(self.info.diagonal))
+        s.position + s.geometric * ray_offset(self.info.bounds_min.as_dvec3(), self.info.bounds_max.as_dvec3(), self.info.diagonal.into())
     }
 
     pub fn sees_light(&self, s: &Surface, light: &Light) -> Result<bool, ()> {
@@ -375,6 +375,11 @@ impl World {
     }
 }
 
+/// How far from surfaces rays start: a share of the scene, or eight units in the last place of its largest coordinate.
+pub fn ray_offset(low: DVec3, high: DVec3, diagonal: f64) -> f64 {
+    (2e-5 * diagonal).max(low.abs().max(high.abs()).max_element() / f64::from(1 << 20))
+}
+
 pub fn coupling(x: &Surface, y: &Surface) -> f64 {
     let offset = x.position - y.position;
     let direction = offset / offset.length_squared().max(1e-30).sqrt();
@@ -430,12 +435,13 @@ pub const FROM_LIGHT: u32 = 0x2000;
 pub const NEXT: u32 = 0x3000;
 
 impl World {
-    /// A path of up to three bounces, which roulette does not end.
-    pub fn gather(&self, i: &[f64]) -> Estimate {
+    /// A path of up to three bounces, which roulette does not end; added to what is known.
+    pub fn gather(&self, i: &[f64], known: Estimate) -> Estimate {
         let mut random = Random::new(i[19] as u32, i[20] as u32, i[21] as u32);
         let (bounces, lights, sky) = (i[22] as u32, i[23] > 0.0, i[24] > 0.0);
         let mut x = Surface::of(i);
-        let (mut sum, mut scale, mut throughput) = (DVec3::splat(0.25), DVec3::splat(0.25), DVec3::ONE);
+        let (mut sum, mut scale) = known?;
+        let mut throughput = DVec3::ONE;
         for bounce in 0..bounces {
             if lights {
                 let chosen = self.choose(random.next())?;
