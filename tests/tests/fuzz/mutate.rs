@@ -159,12 +159,21 @@ struct Pieces {
     values: Vec<Range<usize>>,
 }
 
+/// A bracket that is open while a text is taken apart.
+#[derive(Default)]
+struct Open {
+    entries: Vec<Range<usize>>,
+    /// Where the current entry began.
+    entry: Option<usize>,
+    /// Where the value of the current entry began.
+    value: Option<usize>,
+}
+
 /// Takes a RON text apart; what cannot be read is left out.
 fn pieces(text: &str) -> Pieces {
     let bytes = text.as_bytes();
     let mut found = Pieces::default();
-    // Of each open bracket its entries, where the current one began, and where its value did.
-    let mut open: Vec<(Vec<Range<usize>>, Option<usize>, Option<usize>)> = Vec::new();
+    let mut open: Vec<Open> = Vec::new();
     let mut at = 0;
     let mut last = 0;
     while at < bytes.len() {
@@ -179,7 +188,7 @@ fn pieces(text: &str) -> Pieces {
             continue;
         }
         if !matches!(byte, b',' | b')' | b']' | b'}')
-            && let Some((_, entry, value)) = open.last_mut()
+            && let Some(Open { entry, value, .. }) = open.last_mut()
         {
             entry.get_or_insert(start);
             if byte == b':' {
@@ -196,11 +205,11 @@ fn pieces(text: &str) -> Pieces {
                 found.texts.push(start..at);
             }
             b'(' | b'[' | b'{' => {
-                open.push((Vec::new(), None, None));
+                open.push(Open::default());
                 at += 1;
             }
             b',' | b')' | b']' | b'}' => {
-                if let Some((entries, entry, value)) = open.last_mut() {
+                if let Some(Open { entries, entry, value }) = open.last_mut() {
                     if let Some(entry) = entry.take() {
                         entries.push(entry..last);
                         let value = value.take().unwrap_or(entry);
@@ -208,7 +217,7 @@ fn pieces(text: &str) -> Pieces {
                         found.values.push(value..last);
                     }
                     if byte != b','
-                        && let Some((entries, ..)) = open.pop()
+                        && let Some(Open { entries, .. }) = open.pop()
                     {
                         found.groups.push(entries);
                     }

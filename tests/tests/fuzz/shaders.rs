@@ -79,7 +79,7 @@ impl Bench {
         let text = fs::read_to_string(&file).expect("a shader");
         fs::write(&file, wgsl(&text, random)).expect("written");
         let before = bits(&self.renderer);
-        match self.renderer.reload(&[file.clone()]) {
+        match self.renderer.reload(std::slice::from_ref(&file)) {
             Err(faults) => {
                 assert!(faults.has_errors());
                 check_faults(&faults);
