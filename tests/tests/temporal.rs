@@ -55,7 +55,7 @@ fn play(pipeline: &str, frames: usize) -> Played {
     let (mut pictures, mut second, mut counted): (Vec<Vec<f32>>, f64, u32) = (Vec::new(), 0.0, 0);
     for frame in 0..frames {
         let in_period = frame % PERIOD;
-        if varies && in_period % steps == 0 {
+        if varies && in_period.is_multiple_of(steps) {
             let lights = LIGHTS[in_period / steps];
             renderer.set_parameter("clusters", &lights.to_string()).unwrap_or_else(|e| panic!("{}", e.render()));
         }
