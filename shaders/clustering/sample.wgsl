@@ -18,7 +18,7 @@ struct Params {
     jitter: u32,
 }
 
-@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(0) var<uniform> turn: Frame;
 @group(0) @binding(1) var importance: texture_2d<f32>;
 @group(0) @binding(2) var rsm_flux: texture_2d<f32>;
 @group(0) @binding(3) var rsm_normal: texture_2d<u32>;
@@ -28,7 +28,7 @@ struct Params {
 
 // A point that is uniform over all frames, the same for all lights of one (Cranley and Patterson 1976).
 fn rotation() -> vec2f {
-    return vec2f(unit_float(hash3(frame.index, frame.seed, 1u)), unit_float(hash3(frame.index, frame.seed, 2u)));
+    return vec2f(unit_float(hash3(turn.index, turn.seed, 1u)), unit_float(hash3(turn.index, turn.seed, 2u)));
 }
 
 @compute @workgroup_size(64)

@@ -61,6 +61,11 @@ struct Frame {
     delta_time: f32,
 }
 
+// Seed of what is random once, not in every frame: who reads it in place of `Frame` need not run again while all else stays.
+struct Seed {
+    value: u32,
+}
+
 // Extent and statistics of the scene in world space at this time.
 struct SceneInfo {
     bounds_min: vec3f,

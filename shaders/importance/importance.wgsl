@@ -3,7 +3,7 @@
 // the sampled positions also cut off what lies behind the lit surface (it cannot receive its light).
 // Several lights: each is compared with its own brightest colour, then all of it weighted by what a texel of the light's view can reflect.
 
-#import common::scene::{Light, View, Frame}
+#import common::scene::{Light, View, Seed}
 #import common::rsm::{scene_light_views, view_of_texel, texel_ray}
 #import common::view::pixel_direction
 #import common::octahedral::unpack_unit
@@ -19,7 +19,7 @@ struct Params {
 
 @group(0) @binding(0) var<storage, read> scene_lights: array<Light>;
 @group(0) @binding(1) var<uniform> scene_camera: View;
-@group(0) @binding(2) var<uniform> frame: Frame;
+@group(0) @binding(2) var<uniform> seed: Seed;
 @group(0) @binding(3) var<uniform> params: Params;
 @group(0) @binding(4) var rsm_flux: texture_2d<f32>;
 @group(0) @binding(5) var rsm_albedo: texture_2d<f32>;
@@ -41,7 +41,7 @@ var<workgroup> sample_normal: array<vec3f, MAX_SAMPLES>;
 fn gather_samples(lane: u32) {
     let size = textureDimensions(gbuffer_distance);
     for (var i = lane; i < params.view_samples; i += LANES) {
-        let uv = halton_23(i + 1u + hash(frame.seed) % 1024u);
+        let uv = halton_23(i + 1u + hash(seed.value) % 1024u);
         let pixel = min(vec2u(uv * vec2f(size)), size - 1u);
         let distance = textureLoad(gbuffer_distance, pixel, 0).x;
         sample_position[i] = scene_camera.origin + distance * pixel_direction(scene_camera, pixel, size);

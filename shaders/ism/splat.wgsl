@@ -5,7 +5,7 @@
 // What bounds it: texels covered, about 20 per point at the defaults, half of the points being behind the light's plane.
 
 #import common::points::{ScenePoint, WORLD_SPACE}
-#import common::scene::{Object, SceneInfo, Frame}
+#import common::scene::{Object, SceneInfo, Seed}
 #import common::cluster::{Cluster, CLUSTER_ACTIVE}
 #import common::paraboloid::{basis, paraboloid_project, paraboloid_unproject, paraboloid_scale, atlas_origin}
 #import common::dispatch::linear_index
@@ -24,7 +24,7 @@ struct Params {
 @group(0) @binding(1) var<storage, read> clusters: array<Cluster>;
 @group(0) @binding(2) var<storage, read> scene_objects: array<Object>;
 @group(0) @binding(3) var<uniform> scene_info: SceneInfo;
-@group(0) @binding(4) var<uniform> frame: Frame;
+@group(0) @binding(4) var<uniform> seed: Seed;
 @group(0) @binding(5) var<uniform> params: Params;
 @group(0) @binding(6) var<storage, read_write> ism_splats: array<atomic<u32>>;
 
@@ -142,7 +142,7 @@ fn splat_points(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroup
         first = (i + u32(unit.x * 7.0 * 64.0) + u32(unit.y * 89.0 * 64.0) + u32(unit.z * 991.0 * 64.0)) % maps;
     }
     var copies = u32(params.splat_factor);
-    if unit_float(hash3(i, frame.seed, 77u)) < fract(params.splat_factor) {
+    if unit_float(hash3(i, seed.value, 77u)) < fract(params.splat_factor) {
         copies += 1u;
     }
     copies = min(copies, maps);

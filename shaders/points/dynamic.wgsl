@@ -3,7 +3,7 @@
 // Weights: area, or the number of points of the paper's factors, (t_A + mean t_e)² / 2: the vertices of a triangle with that many
 // steps along each edge. Sums run in a fixed order. What bounds it: the binary search, 17 reads per point for 10⁵ triangles.
 
-#import common::scene::{Vertex, Triangle, Object, SceneInfo, Frame}
+#import common::scene::{Vertex, Triangle, Object, SceneInfo, Seed}
 #import common::points::{ScenePoint, WORLD_SPACE}
 #import common::dispatch::linear_index
 #import common::random::{radical_inverse_2, radical_inverse_3, hash3, unit_float}
@@ -18,7 +18,7 @@ struct Params {
 @group(0) @binding(1) var<storage, read> scene_triangles: array<Triangle>;
 @group(0) @binding(2) var<storage, read> scene_objects: array<Object>;
 @group(0) @binding(3) var<uniform> scene_info: SceneInfo;
-@group(0) @binding(4) var<uniform> frame: Frame;
+@group(0) @binding(4) var<uniform> seed: Seed;
 @group(0) @binding(5) var<uniform> params: Params;
 @group(0) @binding(6) var<storage, read_write> points: array<ScenePoint>;
 @group(0) @binding(7) var<storage, read_write> point_offsets: array<f32>;
@@ -169,7 +169,7 @@ fn emit(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
     // (A sequence over i itself would put all points of a map side by side where k is a power of its base.)
     let map = i % params.clusters;
     let nth = i / params.clusters;
-    let at = min(fract(radical_inverse_2(nth) + unit_float(hash3(map, frame.seed, 1u))), 0x1.fffffep-1) * total;
+    let at = min(fract(radical_inverse_2(nth) + unit_float(hash3(map, seed.value, 1u))), 0x1.fffffep-1) * total;
     var low = 0u;
     var high = triangles - 1u;
     while low < high {
@@ -187,7 +187,7 @@ fn emit(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
     }
     let weight = offset_up_to(low) - previous;
     // Uniform in the triangle: a square folded over its diagonal. What is left of the choice of the triangle is uniform as well.
-    var uv = vec2f(saturate((at - previous) / weight), fract(radical_inverse_3(nth) + unit_float(hash3(map, frame.seed, 2u))));
+    var uv = vec2f(saturate((at - previous) / weight), fract(radical_inverse_3(nth) + unit_float(hash3(map, seed.value, 2u))));
     if uv.x + uv.y > 1.0 {
         uv = 1.0 - uv;
     }

@@ -26,6 +26,7 @@ mod renders;
 mod samples;
 mod second_order;
 mod shadow_maps;
+mod skipping;
 mod support;
 mod sweeps;
 mod temporal;

@@ -25,7 +25,7 @@ fn the_flux_of_samples_is_the_flux_of_the_map() {
     for rsm_size in [100, 128] {
         for (levels, most) in [(16, 1.0), (4, 4.0)] {
             for count in [64, 256, 1024] {
-                let ratios = ratios(job().set("rsm_size", rsm_size).set("sample.warp_levels", levels).set("clusters", count));
+                let ratios = ratios(job().set("rsm_size", rsm_size).set("sample_anew.warp_levels", levels).set("clusters", count));
                 println!("{rsm_size}² texels, {levels} levels, {count} samples: {ratios:.4?}");
                 let bound = most / f64::from(count).sqrt();
                 assert!(ratios.iter().all(|r| (r - 1.0).abs() < bound), "{rsm_size}², {levels} levels, {count} samples: {ratios:?}");
@@ -39,11 +39,8 @@ fn the_flux_of_samples_is_the_flux_of_the_map() {
 fn the_flux_of_samples_is_unbiased() {
     const FRAMES: u32 = 200;
     for (levels, view_weight) in [(16, 0.1), (16, 1.0), (3, 0.1)] {
-        let job = job()
-            .set("clusters", 16)
-            .set("sample.warp_levels", levels)
-            .set("importance.view_weight", view_weight)
-            .set("sample.jitter", true);
+        let job =
+            job().set("clusters", 16).set("sample_anew.warp_levels", levels).set("importance.view_weight", view_weight).set("jitter", true);
         let mut renderer = job.renderer();
         let ratios: Vec<f64> = (0..FRAMES)
             .map(|_| {

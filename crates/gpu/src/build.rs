@@ -21,6 +21,7 @@ use crate::{
     pipeline_cache::LayoutKey,
     poison::{Poison, fills},
     pool,
+    skip::Skipper,
     steps::{Prepared, pass, prepare},
     timing::Timer,
     uses::{host, host_bytes, host_outputs, is_output, usages, used_externals},
@@ -33,13 +34,15 @@ pub struct BuildOptions {
     pub poison: bool,
     /// Look at every number that a node writes, right after it (`Debug::watch_numbers`).
     pub watch_numbers: bool,
+    /// Skip nodes whose inputs are as they were when they ran last. For plans made with `PlanInput::keep_unchanged`; else it does nothing.
+    pub skip_unchanged: bool,
     /// Measure GPU times where the device can.
     pub timestamps: bool,
 }
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self { poison: false, watch_numbers: false, timestamps: true }
+        Self { poison: false, watch_numbers: false, skip_unchanged: false, timestamps: true }
     }
 }
 
@@ -112,6 +115,7 @@ impl Frame {
             host_bytes: host_bytes(plan, &host_outputs),
             poison: None,
             numbers: None,
+            skipper: Skipper::new(plan, options.skip_unchanged),
             timer: Timer::new(gpu, std::iter::empty(), false),
             serial: previous.is_some_and(|f| f.serial),
             index: previous.map_or(0, |f| f.index),

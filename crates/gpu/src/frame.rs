@@ -17,8 +17,9 @@ use crate::{
     host::{HostBytes, HostContext, HostData, SharedHost},
     numbers::{BadNumbers, Numbers},
     poison::{Fill, Poison},
-    pool::{Memory, Place, Resource},
+    pool::{Memory, Place, Resource, copy},
     record::{compute, draw},
+    skip::Skipper,
     timing::{FrameTimings, Timer},
 };
 
@@ -33,6 +34,7 @@ pub struct Frame {
     pub(crate) host_bytes: BTreeMap<ResourceIx, HostBytes>,
     pub(crate) poison: Option<Poison>,
     pub(crate) numbers: Option<Numbers>,
+    pub(crate) skipper: Skipper,
     pub(crate) timer: Timer,
     /// Submit and wait node by node.
     pub(crate) serial: bool,
@@ -159,6 +161,12 @@ impl Frame {
         let start = Instant::now();
         self.follow_externals(gpu, externals)?;
         self.run_hosts(gpu, externals, data)?;
+        let host_bytes = &self.host_bytes;
+        let stamp_of_host = |ix| host_bytes.get(&ix).map_or(0, |bytes| bytes.stamp);
+        self.skipper.decide((self.index & 1) as usize, |name| externals.stamp(name), stamp_of_host);
+        for ix in 0..self.nodes.len() {
+            self.timer.set_ran(ix, self.skipper.runs(ix));
+        }
         if self.serial {
             self.submit_serially(gpu);
         } else {
@@ -206,7 +214,7 @@ impl Frame {
             let start = Instant::now();
             gpu.queue().submit([commands]);
             gpu.wait();
-            let took = nanoseconds(start);
+            let took = if self.skipper.runs(ix) { nanoseconds(start) } else { 0 };
             gpu_ns += took;
             self.timer.set_serial(ix, took);
         }
@@ -219,6 +227,11 @@ impl Frame {
 
     fn latest_parity(&self) -> usize {
         (self.index.wrapping_sub(1) & 1) as usize
+    }
+
+    /// Lets every node run in the next frame, as in the first.
+    pub fn forget(&mut self) {
+        self.skipper.forget();
     }
 
     /// Whether a node has passes, or wrote on the host what is looked at on the GPU.
@@ -240,8 +253,19 @@ impl Frame {
         if !self.has_gpu_work(ix) {
             return;
         }
-        let Self { plan, nodes, timer, poison, numbers, .. } = self;
+        let Self { plan, nodes, timer, poison, numbers, skipper, resources, .. } = self;
         let (node, planned) = (&nodes[ix], &plan.nodes[ix]);
+        for &history in skipper.copies(ix) {
+            if let (Some(from), Some(to)) = (resources[history].memory(1 - parity), resources[history].memory(parity)) {
+                copy(encoder, from, to);
+            }
+        }
+        if !skipper.runs(ix) {
+            if node.host.is_none() {
+                timer.set_cpu(ix, 0);
+            }
+            return;
+        }
         let start = Instant::now();
         let id = planned.id.as_str();
         let _span = tracing::info_span!("node", node = id, stage = planned.stage.as_str()).entered();

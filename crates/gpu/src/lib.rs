@@ -52,6 +52,7 @@ mod params;
 mod pipeline_cache;
 mod poison;
 mod record;
+mod skip;
 mod steps;
 mod uses;
 

@@ -221,8 +221,12 @@ impl<'a> State<'a> {
         // A buffer of another length, or a new producer writes it in another way: the contents move to new memory.
         let moved = |from: &Allocation| {
             let to = make(self.gpu, name, desc, shape)?;
-            copy(self.gpu, &from.memory, &to.memory)
-                .map_err(|message| Fault::Resource { resource: format!("resource `{name}` ({})", describe(desc)), message })?;
+            let copied = self.gpu.scoped(|| {
+                let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
+                copy(&mut encoder, &from.memory, &to.memory);
+                self.gpu.queue().submit([encoder.finish()]);
+            });
+            copied.map_err(|message| Fault::Resource { resource: format!("resource `{name}` ({})", describe(desc)), message })?;
             Ok::<_, Fault>(to)
         };
         Ok(Place::History([moved(&copies[0])?, moved(&copies[1])?]))
@@ -289,24 +293,20 @@ fn same_but_for_count(a: &ResourceDesc, b: &ResourceDesc) -> bool {
 }
 
 /// Copies a texture with all levels and layers into another of the same shape, or of a buffer what has room in another.
-fn copy(gpu: &Gpu, from: &Memory, to: &Memory) -> Result<(), String> {
-    gpu.scoped(|| {
-        let mut encoder = gpu.device().create_command_encoder(&Default::default());
-        match (from, to) {
-            (Memory::Texture(from), Memory::Texture(to)) => {
-                for mip_level in 0..from.mip_level_count() {
-                    let (width, height) = mip_size(from.width(), from.height(), mip_level);
-                    let size = wgpu::Extent3d { width, height, depth_or_array_layers: from.depth_or_array_layers() };
-                    let (origin, aspect) = (wgpu::Origin3d::ZERO, wgpu::TextureAspect::All);
-                    let level = |texture| wgpu::TexelCopyTextureInfo { texture, mip_level, origin, aspect };
-                    encoder.copy_texture_to_texture(level(from), level(to), size);
-                }
+pub(crate) fn copy(encoder: &mut wgpu::CommandEncoder, from: &Memory, to: &Memory) {
+    match (from, to) {
+        (Memory::Texture(from), Memory::Texture(to)) => {
+            for mip_level in 0..from.mip_level_count() {
+                let (width, height) = mip_size(from.width(), from.height(), mip_level);
+                let size = wgpu::Extent3d { width, height, depth_or_array_layers: from.depth_or_array_layers() };
+                let (origin, aspect) = (wgpu::Origin3d::ZERO, wgpu::TextureAspect::All);
+                let level = |texture| wgpu::TexelCopyTextureInfo { texture, mip_level, origin, aspect };
+                encoder.copy_texture_to_texture(level(from), level(to), size);
             }
-            (Memory::Buffer(from), Memory::Buffer(to)) => encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size().min(to.size())),
-            _ => {}
         }
-        gpu.queue().submit([encoder.finish()]);
-    })
+        (Memory::Buffer(from), Memory::Buffer(to)) => encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size().min(to.size())),
+        _ => {}
+    }
 }
 
 fn texture_usages(format: Format, usage: Usage) -> wgpu::TextureUsages {

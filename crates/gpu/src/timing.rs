@@ -24,6 +24,8 @@ pub struct NodeTiming {
     pub cpu_ns: u64,
     /// Time the GPU took from the begin of its first pass to the end of its last; `None` when there is no sample.
     pub gpu_ns: Option<u64>,
+    /// Whether it ran; if not, its times are zero and its outputs are those of an earlier frame.
+    pub ran: bool,
 }
 
 /// Times of one frame.
@@ -50,6 +52,7 @@ struct Slot {
     frame: u64,
     cpu_ns: u64,
     node_cpu_ns: Vec<u64>,
+    node_ran: Vec<bool>,
 }
 
 struct Queries {
@@ -70,6 +73,7 @@ pub(crate) struct Timer {
     latest: FrameTimings,
     has_sample: bool,
     node_cpu_ns: Vec<u64>,
+    node_ran: Vec<bool>,
 }
 
 impl Timer {
@@ -81,12 +85,18 @@ impl Timer {
             let fits = has_passes && count + 2 <= MOST_QUERIES;
             first.push(fits.then_some(count));
             count += if fits { 2 } else { 0 };
-            NodeTiming { id, stage, cpu_ns: 0, gpu_ns: None }
+            NodeTiming { id, stage, cpu_ns: 0, gpu_ns: None, ran: true }
         };
         let nodes: Vec<_> = nodes.map(name).collect();
         let wanted = gpu_times && gpu.has_timestamps() && count > 0;
         let queries = wanted.then(|| Queries::new(gpu, first, count));
-        Self { queries, node_cpu_ns: vec![0; nodes.len()], latest: FrameTimings { nodes, ..Default::default() }, has_sample: false }
+        Self {
+            queries,
+            node_cpu_ns: vec![0; nodes.len()],
+            node_ran: vec![true; nodes.len()],
+            latest: FrameTimings { nodes, ..Default::default() },
+            has_sample: false,
+        }
     }
 
     /// The newest frame whose times are known.
@@ -108,6 +118,13 @@ impl Timer {
         }
     }
 
+    /// Whether a node runs in the frame being recorded.
+    pub(crate) fn set_ran(&mut self, node: usize, ran: bool) {
+        if let Some(slot) = self.node_ran.get_mut(node) {
+            *slot = ran;
+        }
+    }
+
     /// Time of a node that was submitted and waited for on its own.
     pub(crate) fn set_serial(&mut self, node: usize, gpu_ns: u64) {
         if let Some(node) = self.latest.nodes.get_mut(node) {
@@ -118,10 +135,14 @@ impl Timer {
     /// After a frame whose nodes were waited for one after the other.
     pub(crate) fn ran_serially(&mut self, frame: u64, cpu_ns: u64, gpu_ns: u64) {
         (self.latest.frame, self.latest.cpu_ns, self.latest.gpu_ns) = (frame, cpu_ns, Some(gpu_ns));
-        for (node, ns) in self.latest.nodes.iter_mut().zip(&self.node_cpu_ns) {
-            node.cpu_ns = *ns;
-        }
+        self.take_cpu_times();
         self.has_sample = true;
+    }
+
+    fn take_cpu_times(&mut self) {
+        for (node, (ns, ran)) in self.latest.nodes.iter_mut().zip(self.node_cpu_ns.iter().zip(&self.node_ran)) {
+            (node.cpu_ns, node.ran) = (*ns, *ran);
+        }
     }
 
     /// Collects what has arrived and chooses a slot for the frame to be recorded.
@@ -154,6 +175,7 @@ impl Timer {
                 let slot = &mut queries.ring[chosen];
                 (slot.frame, slot.cpu_ns) = (frame, cpu_ns);
                 slot.node_cpu_ns.copy_from_slice(&self.node_cpu_ns);
+                slot.node_ran.copy_from_slice(&self.node_ran);
                 slot.state.store(PENDING, Ordering::Release);
                 let state = slot.state.clone();
                 slot.buffer.map_async(wgpu::MapMode::Read, .., move |result| {
@@ -162,9 +184,7 @@ impl Timer {
             }
             None => {
                 (self.latest.frame, self.latest.cpu_ns) = (frame, cpu_ns);
-                for (node, ns) in self.latest.nodes.iter_mut().zip(&self.node_cpu_ns) {
-                    node.cpu_ns = *ns;
-                }
+                self.take_cpu_times();
                 self.has_sample = true;
             }
         }
@@ -205,14 +225,23 @@ fn take(slot: &Slot, firsts: &[Option<u32>], period_ns: f64, into: &mut FrameTim
     let nanoseconds = |from: u64, to: u64| Some((to.checked_sub(from)? as f64 * period_ns) as u64);
     let (mut first, mut last) = (u64::MAX, 0);
     for (i, node) in into.nodes.iter_mut().enumerate() {
-        node.cpu_ns = slot.node_cpu_ns[i];
+        (node.cpu_ns, node.ran) = (slot.node_cpu_ns[i], slot.node_ran[i]);
+        if !node.ran {
+            // Its queries hold what an earlier frame wrote.
+            node.gpu_ns = Some(0);
+            continue;
+        }
         let ticks = firsts[i].and_then(|query| tick(query).zip(tick(query + 1)));
         node.gpu_ns = ticks.and_then(|(from, to)| {
             (first, last) = (first.min(from), last.max(to));
             nanoseconds(from, to)
         });
     }
-    into.gpu_ns = if last == 0 { None } else { nanoseconds(first, last) };
+    into.gpu_ns = match last {
+        0 if slot.node_ran.contains(&true) => None,
+        0 => Some(0),
+        last => nanoseconds(first, last),
+    };
     (into.frame, into.cpu_ns) = (slot.frame, slot.cpu_ns);
     true
 }
@@ -230,6 +259,7 @@ impl Queries {
             frame: 0,
             cpu_ns: 0,
             node_cpu_ns: vec![0; nodes],
+            node_ran: vec![true; nodes],
         };
         Self {
             set: device.create_query_set(&wgpu::QuerySetDescriptor { label: Some("timestamps"), ty: wgpu::QueryType::Timestamp, count }),

@@ -22,17 +22,18 @@ pub(crate) struct Declaration {
     pub params: IndexMap<String, Param>,
     pub steps: Vec<Step>,
     pub requires: Vec<String>,
+    pub settles: Option<String>,
     pub span: Span,
 }
 
 impl Declaration {
     pub fn into_node(self, name: &str, shader: Option<Arc<crate::shader::Shader>>) -> NodeDecl {
-        let Self { doc, ports, params, steps, requires, span } = self;
-        NodeDecl { name: name.to_owned(), doc, ports, params, steps, requires, shader, span }
+        let Self { doc, ports, params, steps, requires, settles, span } = self;
+        NodeDecl { name: name.to_owned(), doc, ports, params, steps, requires, settles, shader, span }
     }
 }
 
-const NODE: Shape = Shape { what: "Node", required: &["doc"], optional: &["inputs", "outputs", "params", "requires", "steps"] };
+const NODE: Shape = Shape { what: "Node", required: &["doc"], optional: &["inputs", "outputs", "params", "requires", "settles", "steps"] };
 
 /// Reads the declaration in `source`. `None` when there is nothing to go on with; faults go to `out`.
 pub(crate) fn read(source: &Arc<Source>, host: bool, out: &mut Vec<Diagnostic>) -> Option<Declaration> {
@@ -75,6 +76,16 @@ fn read_node(reader: &mut Reader, tree: &Tree, host: bool) -> Option<Declaration
             }
         }
     }
+    let settles = fields.get("settles").and_then(|tree| {
+        let name = reader.text(tree, "the name of an Int parameter in quotes")?;
+        let is_count = |param: &Param| matches!(param.kind, crate::value::ParamKind::Int { min: 0.., .. });
+        if !params.get(&name.text).is_some_and(is_count) {
+            let help = "declare it in `params` as Int(min: 0, …): the frames that the node takes to settle, 0 for never";
+            reader.error(&tree.range, format!("`{}` is no Int parameter of this node that is never negative", name.text), help);
+            return None;
+        }
+        Some(name.text)
+    });
     let mut steps = Vec::new();
     match fields.get("steps") {
         Some(tree) if host => reader.error(&tree.range, "a node written in Rust has no steps", "remove `steps`"),
@@ -90,7 +101,7 @@ fn read_node(reader: &mut Reader, tree: &Tree, host: bool) -> Option<Declaration
         None if host || fields.tried("steps") => {}
         None => reader.error(&head(tree), "missing field `steps` in Node", "add `steps: [(entry: \"…\", over: …)]`"),
     }
-    Some(Declaration { doc, ports, params, steps, requires, span: reader.span(&head(tree)) })
+    Some(Declaration { doc, ports, params, steps, requires, settles, span: reader.span(&head(tree)) })
 }
 
 fn read_ports(reader: &mut Reader, tree: &Tree, direction: Direction, ports: &mut IndexMap<String, Port>) {

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use crate::{
-    registry::NodeDecl,
+    registry::{Direction, NodeDecl},
     value::{ResourceDesc, Value},
 };
 
@@ -20,6 +20,8 @@ pub struct PlanInput {
     pub externals: BTreeMap<String, ResourceDesc>,
     /// Resources to keep although nobody reads them (dumps).
     pub keep: Vec<String>,
+    /// Keep what every node writes until it writes it anew, so that nodes whose inputs are unchanged need not run: no memory is shared.
+    pub keep_unchanged: bool,
     /// Debug switches; none may change the picture.
     pub debug: Debug,
 }
@@ -144,6 +146,18 @@ pub struct PlanNode {
     pub params: Vec<(String, Value)>,
     /// Steps in order, repetitions unrolled; empty for a host node.
     pub steps: Vec<PlanStep>,
+    /// Frames after which it stops, when nothing but the frame's number and its own history changed; its outputs stay.
+    pub settles: Option<u32>,
+}
+
+impl PlanNode {
+    /// Resources that it writes.
+    pub fn outputs(&self) -> impl Iterator<Item = ResourceIx> + '_ {
+        self.bindings.iter().filter_map(|(port, target)| match target {
+            Target::Resource(ix) if self.decl.ports.get(port).is_some_and(|p| p.direction == Direction::Output) => Some(*ix),
+            _ => None,
+        })
+    }
 }
 
 /// Why a node will not run.

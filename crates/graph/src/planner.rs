@@ -133,7 +133,8 @@ impl<'a> Planner<'a, '_> {
         }
         let presents = table.index.get(self.linked.pipeline.presents.text.as_str()).copied();
         let radiance = self.linked.pipeline.radiance.as_ref().and_then(|r| table.index.get(r.text.as_str()).copied());
-        let slots = table.lifetimes(self.linked.pipeline, presents, radiance, &self.input.keep, !self.input.debug.no_reuse);
+        let share = !self.input.debug.no_reuse && !self.input.keep_unchanged;
+        let slots = table.lifetimes(self.linked.pipeline, &nodes, [presents, radiance], &self.input.keep, share);
         let idle = self.idle(activity, runs);
         Some(Plan {
             nodes,
@@ -189,7 +190,10 @@ impl<'a> Planner<'a, '_> {
         // Nodes without a declaration write nothing that is known, so none is live.
         let decl = std::sync::Arc::clone(linked.decl?);
         let steps = steps::unroll(&id, &NodeScope { decl: &decl, ports, params: &params, output: self.input.output }, self.out);
-        Some(PlanNode { id, stage: linked.usage.stage.clone(), decl, bindings, params, steps })
+        let frames = decl.settles.as_ref().and_then(|name| params.iter().find(|(known, _)| known == name));
+        let settles = frames
+            .and_then(|(_, value)| if let crate::value::Value::Int(frames @ 1..) = value { u32::try_from(*frames).ok() } else { None });
+        Some(PlanNode { id, stage: linked.usage.stage.clone(), decl, bindings, params, steps, settles })
     }
 
     fn idle(&self, activity: &Activity<'a>, runs: &BTreeSet<usize>) -> Vec<IdleNode> {
@@ -230,20 +234,24 @@ impl<'a> Table<'a> {
         *last = (*last).max(position);
     }
 
-    fn lifetimes(&mut self, pipeline: &Pipeline, presents: Option<usize>, radiance: Option<usize>, keep: &[String], reuse: bool) -> usize {
+    fn lifetimes(&mut self, pipeline: &Pipeline, nodes: &[PlanNode], shown: [Option<usize>; 2], keep: &[String], share: bool) -> usize {
+        // What a node left when it settled must stay: it would come to something else if it ran again.
+        let settled: BTreeSet<usize> = nodes.iter().filter(|node| node.settles.is_some()).flat_map(PlanNode::outputs).collect();
         for (ix, resource) in self.resources.iter_mut().enumerate() {
             if resource.lifetime == Lifetime::External {
                 continue;
             }
             let history = pipeline.resources.get(&resource.name).is_some_and(|r| r.history);
-            let shown = presents == Some(ix) || radiance == Some(ix);
+            let shown = shown.contains(&Some(ix));
             resource.usage.read |= shown;
             resource.lifetime = match self.lives[ix] {
                 _ if history && self.previous[ix] => Lifetime::History,
-                Some((first, last)) if !shown && !keep.contains(&resource.name) => Lifetime::Transient { first, last, slot: 0 },
+                Some((first, last)) if !shown && !keep.contains(&resource.name) && !settled.contains(&ix) => {
+                    Lifetime::Transient { first, last, slot: 0 }
+                }
                 _ => Lifetime::Kept,
             };
         }
-        slots::assign(&mut self.resources, reuse)
+        slots::assign(&mut self.resources, share)
     }
 }

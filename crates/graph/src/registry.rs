@@ -171,6 +171,8 @@ pub struct NodeDecl {
     pub steps: Vec<Step>,
     /// Device features it cannot do without, as wgpu names them (`FLOAT32_FILTERABLE`).
     pub requires: Vec<String>,
+    /// Int parameter that says after how many frames the node stops, when nothing but the frame's number and its own history changed; 0: never.
+    pub settles: Option<String>,
     /// The shader; `None` for a host node.
     pub shader: Option<Arc<Shader>>,
     /// Where it is declared.

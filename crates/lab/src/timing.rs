@@ -32,6 +32,8 @@ pub struct NodeSamples {
     pub cpu: Samples,
     /// Its work on the GPU.
     pub gpu: Samples,
+    /// Frames in which it was skipped: nothing of what it depends on had changed.
+    pub skipped: usize,
 }
 
 /// Times of several frames, in milliseconds.
@@ -73,6 +75,7 @@ impl FrameSamples {
         for (samples, timing) in self.nodes.iter_mut().zip(&timings.nodes) {
             samples.cpu.push(Some(milliseconds(timing.cpu_ns)));
             samples.gpu.push(timing.gpu_ns.map(milliseconds));
+            samples.skipped += usize::from(!timing.ran);
         }
     }
 
@@ -112,7 +115,7 @@ pub fn timings(samples: &FrameSamples, serial: bool) -> Value {
     let nodes: Vec<Value> = samples
         .nodes
         .iter()
-        .map(|n| json!({"id": n.id, "stage": n.stage, "host": n.host, "cpu_ms": summary(&n.cpu), "gpu_ms": summary(&n.gpu)}))
+        .map(|n| json!({"id": n.id, "stage": n.stage, "host": n.host, "cpu_ms": summary(&n.cpu), "gpu_ms": summary(&n.gpu), "skipped": n.skipped}))
         .collect();
     json!({
         "method": if serial { "serial" } else { "timestamps" },

@@ -11,7 +11,7 @@ use manylight_graph::{
 };
 use manylight_scene::{
     Scene, SceneState,
-    gpu_data::{self, Frame, Light, LightView, SceneInfo, View},
+    gpu_data::{self, Frame, Light, LightView, SceneInfo, Seed, View},
 };
 
 use crate::baked::{Baked, CORNERS, Lookup};
@@ -32,6 +32,7 @@ struct Entry {
 
 const ENTRIES: &[Entry] = &[
     uniform("frame", "Frame", "number of the frame, seed, scene time"),
+    uniform("seed", "Seed", "seed of what is random once, not in every frame"),
     uniform("scene_camera", "View", "the camera"),
     uniform("scene_info", "SceneInfo", "bounds, areas and counts of the scene at this time"),
     uniform("scene_sky", "Sky", "light of the sky at this time, W/(m² sr); black if the scene has none"),
@@ -141,6 +142,7 @@ pub fn descriptions(scene: &Scene, baked: Option<&Baked>) -> BTreeMap<String, Re
 fn size_of_element(element: &str) -> u32 {
     let size = match element {
         "Frame" => size_of::<Frame>(),
+        "Seed" => size_of::<Seed>(),
         "View" => size_of::<View>(),
         "Light" => size_of::<Light>(),
         "LightView" => size_of::<LightView>(),
@@ -191,8 +193,10 @@ impl SceneUpload {
             self.scene = Some(scene.hash);
         }
         let camera = state.camera_view(aspect);
-        let parts: [(&'static str, &[u8]); 7] = [
+        let seed = Seed { value: frame.seed };
+        let parts: [(&'static str, &[u8]); 8] = [
             ("frame", bytes_of(frame)),
+            ("seed", bytes_of(&seed)),
             ("scene_camera", bytes_of(&camera)),
             ("scene_info", bytes_of(&state.info)),
             ("scene_sky", bytes_of(&state.sky)),

@@ -37,6 +37,9 @@ pub struct Settings {
     pub set: Vec<(String, String)>,
     /// Resources to keep for [`Renderer::read`] besides the picture and the radiance.
     pub keep: Vec<String>,
+    /// Skip nodes whose inputs are as they were, for the memory of keeping all that nodes write; the picture is the same. What is measured
+    /// to be compared is measured without.
+    pub skip_unchanged: bool,
     /// Debug switches; none changes the picture.
     pub debug: Debug,
     /// Seed of everything random.
@@ -208,6 +211,7 @@ pub fn plan_input(settings: &Settings, scene: &Scene) -> PlanInput {
         features: features(settings, scene),
         externals: descriptions(scene, settings.baked.as_deref()),
         keep: settings.keep.clone(),
+        keep_unchanged: settings.skip_unchanged,
         debug: settings.debug,
     }
 }
@@ -303,6 +307,7 @@ impl Renderer {
     pub fn restart(&mut self) {
         self.first = self.frame.index();
         self.last_time = None;
+        self.frame.forget();
     }
 
     /// Reads a texture of the latest frame: the picture, the radiance, a history, or one named in [`Settings::keep`]. Waits for the GPU.
@@ -485,7 +490,12 @@ fn build(
     previous: Option<&Frame>,
     settings: &Settings,
 ) -> Result<(Frame, BuildReport), Diagnostics> {
-    let options = BuildOptions { poison: settings.debug.poison, watch_numbers: settings.debug.watch_numbers, ..Default::default() };
+    let options = BuildOptions {
+        poison: settings.debug.poison,
+        watch_numbers: settings.debug.watch_numbers,
+        skip_unchanged: settings.skip_unchanged,
+        ..Default::default()
+    };
     Frame::build(gpu, plan, &scene.externals, hosts, previous, options).map_err(|e| e.diagnostics())
 }
 

@@ -131,6 +131,14 @@ pub struct Frame {
     pub delta_time: f32,
 }
 
+/// Seed of what is random once, not in every frame.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+pub struct Seed {
+    /// Any number.
+    pub value: u32,
+}
+
 /// Extent and statistics of the scene in world space at one time.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
@@ -376,6 +384,7 @@ pub fn layouts() -> Vec<(&'static str, Layout)> {
         layout!(LightView { view, light, kind, face, weight }),
         layout!(Sky { zenith, daylight, horizon, exponent, ground, is_lit }),
         layout!(Frame { index, seed, time, delta_time }),
+        layout!(Seed { value }),
         layout!(SceneInfo {
             bounds_min,
             diagonal,

@@ -143,6 +143,7 @@ impl Binder<'_> {
                 used.insert(name);
             }
         }
+        used.extend(self.decl.settles.as_deref());
         let mut in_steps = BTreeSet::new();
         self.decl.steps.iter().for_each(|s| step_params(s, &mut in_steps));
         for (name, param) in &self.decl.params {

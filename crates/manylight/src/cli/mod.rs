@@ -81,6 +81,9 @@ pub struct DebugArgs {
     /// Run nodes that nobody reads
     #[arg(long)]
     pub no_culling: bool,
+    /// Run nodes whose inputs are as they were as well, and let resources share memory
+    #[arg(long)]
+    pub no_skipping: bool,
     /// Give every resource memory of its own
     #[arg(long)]
     pub no_reuse: bool,
@@ -266,6 +269,9 @@ pub struct ProfileArgs {
     /// Frames to render first that are not measured
     #[arg(long, value_name = "N", default_value_t = 4)]
     pub warm_up: u32,
+    /// Measure frames as they are in a window: nodes whose inputs are as they were are skipped. Without it every node runs in every frame
+    #[arg(long)]
+    pub skip_unchanged: bool,
     /// How nodes are timed. Timestamps of software adapters are not tied to the work around them
     #[arg(long, value_enum, default_value = "auto")]
     pub timing: Timing,

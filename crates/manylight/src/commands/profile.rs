@@ -1,6 +1,7 @@
 //! `manylight profile`: what each node costs.
 
 use manylight::{
+    Settings,
     fault::Fault,
     files::{FileKind, check_writable},
     lab::{
@@ -33,7 +34,7 @@ pub fn run(cli: &Cli, args: &ProfileArgs) -> Result<(), Fault> {
     }
     let session = Session::open(cli, &args.pipeline.pipeline)?;
     let scene = session.scene(&args.frame.scene)?;
-    let settings = settings(&args.pipeline, &args.frame, Vec::new())?;
+    let settings = Settings { skip_unchanged: args.skip_unchanged, ..settings(&args.pipeline, &args.frame, Vec::new())? };
     session.plan(Some(&scene), &settings)?;
     let gpu = super::open_gpu(args.frame.adapter.as_ref())?;
     let mut renderer = session.renderer(&gpu, scene, settings)?;
@@ -137,7 +138,11 @@ fn text(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> Stri
     };
     let mut nodes = Table::new(&[&[("node", true), ("stage", true)][..], &columns].concat());
     for node in &samples.nodes {
-        nodes.row([vec![node.id.clone(), node.stage.clone()], times(node)].concat());
+        let skipped = match node.skipped {
+            0 => String::new(),
+            frames => format!(" (skipped in {frames} of {})", args.frames),
+        };
+        nodes.row([vec![node.id.clone() + &skipped, node.stage.clone()], times(node)].concat());
     }
     if rest.is_some() {
         nodes.row(vec!["(between nodes)".to_owned(), String::new(), ms(rest), String::new(), share(rest, total)]);

@@ -28,7 +28,9 @@ pub fn run(cli: &Cli, args: &RenderArgs) -> Result<(), Fault> {
     check(args, &outputs)?;
     let session = Session::open(cli, &args.pipeline.pipeline)?;
     let scene = session.scene(&args.frame.scene)?;
-    let settings = settings(&args.pipeline, &args.frame, outputs.keep(session.documents.registry()))?;
+    let mut settings = settings(&args.pipeline, &args.frame, outputs.keep(session.documents.registry()))?;
+    // Times are those of all work.
+    settings.skip_unchanged &= args.stats.is_none();
     outputs.check_plan(&session.plan(Some(&scene), &settings)?)?;
     let gpu = super::open_gpu(args.frame.adapter.as_ref())?;
     let spinner = progress::spinner("compiling shaders");

@@ -74,7 +74,15 @@ impl Session {
 /// Settings as the command line gives them.
 pub fn settings(pipeline: &PipelineArgs, frame: &FrameArgs, keep: Vec<String>) -> Result<Settings, Fault> {
     let baked = frame.baked.as_deref().map(baked).transpose()?.map(Arc::new);
-    Ok(Settings { size: frame.size.size, set: pipeline.set.clone(), keep, debug: debug(&frame.debug), seed: frame.seed, baked })
+    Ok(Settings {
+        size: frame.size.size,
+        set: pipeline.set.clone(),
+        keep,
+        debug: debug(&frame.debug),
+        skip_unchanged: !frame.debug.no_skipping,
+        seed: frame.seed,
+        baked,
+    })
 }
 
 /// Reads a file of baked light.

@@ -1,0 +1,166 @@
+//! Which nodes of a frame have to run: those of whose inputs one has changed since they ran.
+//!
+//! Every resource has a version, which changes when it is written by a node that ran, or set from outside. A node whose inputs have the versions that
+//! they had when it ran last would write the same bits again: it is skipped, and its outputs stay. What depends on the number of the frame, or on what
+//! it wrote itself in the frame before, has other inputs in every frame: it always runs, or declares that it `settles`: then it stops some frames after
+//! the last change of anything else. That is part of what the node means, and holds whether unchanged nodes are skipped or not.
+
+use manylight_graph::{
+    plan::{Lifetime, Plan, ResourceIx, Target},
+    registry::Direction,
+};
+
+/// The external that is another one in every frame.
+const FRAME: &str = "frame";
+
+/// What decides, from frame to frame.
+pub(crate) struct Skipper {
+    nodes: Vec<NodeState>,
+    /// Versions of what each resource holds, of both copies where it has history.
+    content: Vec<[u64; 2]>,
+    /// The frame in which something that a resource depends on changed last, other than the number of the frame.
+    cause: Vec<u64>,
+    /// Externals with the stamps that they had.
+    externals: Vec<(ResourceIx, String, u64)>,
+    /// The resource that changes in every frame.
+    frame: Option<ResourceIx>,
+    /// Frames decided so far.
+    now: u64,
+    /// The latest version given out.
+    newest: u64,
+    /// Whether nodes are skipped where that changes nothing.
+    on: bool,
+}
+
+struct NodeState {
+    inputs: Vec<Target>,
+    outputs: Vec<ResourceIx>,
+    /// Those of the outputs that have two copies.
+    histories: Vec<ResourceIx>,
+    settles: Option<u64>,
+    on_host: bool,
+    /// Versions of the inputs when it ran last.
+    ran_with: Vec<u64>,
+    runs: bool,
+    /// Whether the copies of its histories differ although it does not run.
+    copies: bool,
+}
+
+impl Skipper {
+    /// For a plan; unchanged nodes are skipped only if no memory is shared.
+    pub(crate) fn new(plan: &Plan, skip_unchanged: bool) -> Self {
+        let transients = plan.resources.iter().filter(|r| matches!(r.lifetime, Lifetime::Transient { .. })).count();
+        let on = skip_unchanged && plan.slots >= transients;
+        let nodes = plan.nodes.iter().map(|node| {
+            let is_input = |port: &String| node.decl.ports.get(port).is_none_or(|p| p.direction == Direction::Input);
+            let inputs = node.bindings.iter().filter(|(port, target)| is_input(port) && *target != Target::Absent);
+            let outputs: Vec<ResourceIx> = node.outputs().collect();
+            NodeState {
+                inputs: inputs.map(|(_, target)| *target).collect(),
+                histories: outputs.iter().copied().filter(|ix| plan.resources[*ix].lifetime == Lifetime::History).collect(),
+                outputs,
+                settles: node.settles.map(u64::from),
+                on_host: node.decl.shader.is_none(),
+                ran_with: Vec::new(),
+                runs: true,
+                copies: false,
+            }
+        });
+        let externals = plan.resources.iter().enumerate().filter(|(_, r)| r.lifetime == Lifetime::External);
+        Self {
+            nodes: nodes.collect(),
+            content: vec![[0; 2]; plan.resources.len()],
+            cause: vec![0; plan.resources.len()],
+            externals: externals.map(|(ix, r)| (ix, r.name.clone(), 0)).collect(),
+            frame: plan.resource(FRAME),
+            now: 0,
+            newest: 0,
+            on,
+        }
+    }
+
+    /// Lets all nodes run once more, as in the first frame.
+    pub(crate) fn forget(&mut self) {
+        self.nodes.iter_mut().for_each(|node| node.ran_with.clear());
+        self.cause.fill(self.now + 1);
+    }
+
+    /// Whether a node runs in this frame.
+    pub(crate) fn runs(&self, node: usize) -> bool {
+        self.nodes[node].runs
+    }
+
+    /// Histories whose other copy must be brought up to date in place of running their node.
+    pub(crate) fn copies(&self, node: usize) -> &[ResourceIx] {
+        let node = &self.nodes[node];
+        if node.copies { &node.histories } else { &[] }
+    }
+
+    /// Decides for the next frame, from the stamps of externals and of what host nodes wrote.
+    pub(crate) fn decide(&mut self, parity: usize, external: impl Fn(&str) -> u64, host: impl Fn(ResourceIx) -> u64) {
+        self.now += 1;
+        let Self { nodes, content, cause, externals, frame, now, newest, on } = self;
+        for (ix, name, known) in externals {
+            let stamp = external(name);
+            if *known != stamp {
+                *known = stamp;
+                content[*ix] = [stamp; 2];
+                if Some(*ix) != *frame {
+                    cause[*ix] = *now;
+                }
+            }
+        }
+        for node in nodes {
+            if node.on_host {
+                // It ran already, or not.
+                node.runs = false;
+                for &ix in &node.outputs {
+                    let stamp = host(ix);
+                    if content[ix] != [stamp; 2] {
+                        (content[ix], cause[ix], node.runs) = ([stamp; 2], *now, true);
+                    }
+                }
+                continue;
+            }
+            let version = |target: &Target| match *target {
+                Target::Resource(ix) => content[ix][parity],
+                Target::Previous(ix) => content[ix][1 - parity],
+                Target::Absent => 0,
+            };
+            let changed = node.inputs.iter().filter_map(|target| match *target {
+                Target::Resource(ix) | Target::Previous(ix) if Some(ix) != *frame => Some(cause[ix]),
+                _ => None,
+            });
+            let changed = changed.max().unwrap_or(0);
+            let is_first = node.ran_with.is_empty();
+            let settled = !is_first && node.settles.is_some_and(|frames| *now - changed > frames);
+            let same = !is_first && node.inputs.iter().map(version).eq(node.ran_with.iter().copied());
+            // Without inputs there is nothing that could change.
+            let same = same || (node.inputs.is_empty() && node.ran_with == [0]);
+            node.runs = !settled && !(*on && same);
+            node.copies = false;
+            if node.runs {
+                node.ran_with.clear();
+                node.ran_with.extend(node.inputs.iter().map(version));
+                if node.inputs.is_empty() {
+                    node.ran_with.push(0);
+                }
+            }
+            for &ix in &node.outputs {
+                let two = node.histories.contains(&ix);
+                if node.runs && !same {
+                    *newest += 1;
+                    if two {
+                        content[ix][parity] = *newest;
+                    } else {
+                        content[ix] = [*newest; 2];
+                    }
+                } else if two && content[ix][parity] != content[ix][1 - parity] {
+                    content[ix][parity] = content[ix][1 - parity];
+                    node.copies = !node.runs;
+                }
+                cause[ix] = cause[ix].max(changed);
+            }
+        }
+    }
+}
