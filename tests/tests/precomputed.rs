@@ -253,14 +253,18 @@ fn light_that_does_not_fit_is_refused_with_a_reason() {
     manylight(&["bake", "day"]).expect(2);
 }
 
-/// The room of `day` whose camera is that of `day` until noon and has gone to another corner by two o'clock.
-fn walk(folder: &Path) -> PathBuf {
+/// The room of `day` with another camera: what stands instead of its field of view.
+fn moving(folder: &Path, camera: &str) -> PathBuf {
     let assets = root().join("assets");
     let text = fs::read_to_string(assets.join("day.ron")).expect("a text");
     let text = text.replace("\"day.obj\"", &format!("{:?}", assets.join("day.obj").to_string_lossy()));
-    let motion = "fov_x_deg: 72.0, motion: [(time: 43200.0), (time: 50400.0, origin: (3.4, 1.6, 1.2), target: (0.6, 1.0, 4.6))]";
-    fs::write(folder.join("walk.ron"), text.replace("fov_x_deg: 72.0", motion)).expect("written");
-    folder.join("walk.ron")
+    fs::write(folder.join("moving.ron"), text.replace("fov_x_deg: 72.0", camera)).expect("written");
+    folder.join("moving.ron")
+}
+
+/// The room of `day` whose camera is that of `day` until noon and has gone to another corner by two o'clock.
+fn walk(folder: &Path) -> PathBuf {
+    moving(folder, "fov_x_deg: 72.0, motion: [(time: 43200.0), (time: 50400.0, origin: (3.4, 1.6, 1.2), target: (0.6, 1.0, 4.6))]")
 }
 
 /// Light over the surfaces of that room, with all of its components and a key frame every two hours, baked once for all tests.
@@ -275,10 +279,13 @@ fn walked() -> &'static (tempfile::TempDir, PathBuf, PathBuf) {
 }
 
 fn bake_atlas(scene: &Path, out: &Path, work: &Path) -> Vec<String> {
+    bake_moving(scene, out, work, &["--lookup", "atlas", "--texels", "4096", "--interval", "2h"])
+}
+
+fn bake_moving(scene: &Path, out: &Path, work: &Path, lookup: &[&str]) -> Vec<String> {
     let [scene, out, work] = [scene, out, work].map(|path| path.to_string_lossy().into_owned());
-    let files = ["bake", &scene, "--out", &out, "--work", &work];
-    let options = ["--lookup", "atlas", "--texels", "4096", "--paths", "64", "--interval", "2h", "--variance", "1"];
-    files.iter().chain(&options).map(|text| (*text).to_owned()).collect()
+    let files = ["bake", &scene, "--out", &out, "--work", &work, "--paths", "64", "--variance", "1"];
+    files.iter().chain(lookup).map(|text| (*text).to_owned()).collect()
 }
 
 /// From wherever the camera is, light of an atlas agrees with the path tracer's: its energy to 5 % and the means of 3×3 pixels to 20 % of the mean, which is
@@ -304,6 +311,36 @@ fn a_moving_camera_sees_the_light_that_is_there() {
     let other = error(&blocks(&pictures[0]), &blocks(&pictures[1]));
     println!("from one camera to the other: {other:.4}");
     assert!(other > 0.5, "the cameras see other things: {other}");
+}
+
+/// The room of `day` with a camera that turns round in it, looks up, and looks down.
+fn turn(folder: &Path) -> PathBuf {
+    let keys = [(8, "(3.6, 1.05, 0.6)"), (10, "(0.1, 1.2, 3)"), (12, "(1, 5, 4.5)"), (14, "(0.7, 0, 4.5)")];
+    let keys: String = keys.iter().map(|(hour, target)| format!("(time: {}, target: {target}), ", 3600 * hour)).collect();
+    moving(folder, &format!("fov_x_deg: 100, motion: [{keys}]"))
+}
+
+/// A cube holds what is seen in all directions: wherever the camera looks, surfaces are found at their distance but for 5 % of the pixels (silhouettes, with
+/// texels as large as pixels), and light of the others has the path tracer's energy to 5 % and its means of 3×3 pixels to 20 % of the mean.
+#[test]
+fn a_turning_camera_sees_the_light_that_is_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (scene, file, work) = (turn(folder.path()), folder.path().join("turn.baked"), folder.path().join("work"));
+    let bake = bake_moving(&scene, &file, &work, &["--lookup", "cube", "--side", "24", "--interval", "2h"]);
+    run(&bake).expect(0).says(&["72×48 texels"]);
+    let mut renderer = job("precomputed.ron", &scene).keep(&["indirect"]).baked(&baked(&file)).set("sky", false).renderer();
+    let mut reference = job("reference.ron", &scene).set("component", "indirect").set("paths", 256).renderer();
+    for hour in [8.0, 10.0, 12.0, 14.0] {
+        renderer.render_frame(hour * HOUR).unwrap_or_else(|e| panic!("{e}"));
+        reference.render_frame(hour * HOUR).unwrap_or_else(|e| panic!("{e}"));
+        let (image, mut truth) = (read(&renderer, "indirect"), rgb(&read(&reference, "composed")));
+        let is_found: Vec<f32> = image.data.chunks_exact(4).map(|pixel| pixel[3]).collect();
+        truth.chunks_exact_mut(3).zip(&is_found).for_each(|(light, found)| light.iter_mut().for_each(|v| *v *= found));
+        let (image, found) = (rgb(&image), mean(&is_found));
+        let (energy, off) = (mean(&image) / mean(&truth), error(&blocks(&image), &blocks(&truth)));
+        println!("{hour} h: found {found:.4}, energy {energy:.4}, error {off:.4}");
+        assert!(found > 0.95 && (energy - 1.0).abs() < 0.05 && off < 0.2, "{found} {energy} {off}");
+    }
 }
 
 /// A camera that stands still sees the same by both look-ups, sky and all, to the same tolerances.
@@ -354,11 +391,13 @@ fn an_atlas_is_not_traced_twice() {
 fn options_of_the_other_look_up_are_refused() {
     let bake = |more: &[&str]| manylight(&[&["bake", "day", "--out", "x.baked"], more].concat());
     bake(&["--texels", "4096"]).expect(1).says(&["--lookup atlas"]);
+    bake(&["--lookup", "cube", "--texels", "4096"]).expect(1).says(&["--lookup atlas", "--side"]);
     bake(&["--lookup", "atlas", "--size", "24x18"]).expect(1).says(&["--texels"]);
     bake(&["--lookup", "atlas", "--texels", "64"]).expect(1).says(&["texels", "day"]);
     let folder = tempfile::tempdir().expect("a folder");
     let scene = walk(folder.path()).to_string_lossy().into_owned();
     manylight(&["bake", &scene, "--out", "x.baked"]).expect(1).says(&["camera", "--lookup atlas"]);
+    manylight(&["bake", &scene, "--lookup", "cube", "--out", "x.baked"]).expect(1).says(&["turns", "--lookup atlas"]);
 }
 
 /// An object that was not there when light was baked has direct light only, and what is beside it has its own.

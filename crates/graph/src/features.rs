@@ -11,6 +11,7 @@ pub const KNOWN: &[&str] = &[
     "several_lights",
     "normals",
     "baked_atlas",
+    "baked_cube",
 ];
 
 /// Device features that a node's `requires` can name: those of wgpu that change what a shader may do.

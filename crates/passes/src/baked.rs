@@ -27,6 +27,10 @@ const FIXED: usize = 16;
 const MOST_LAYERS: usize = 256;
 /// Sides of textures beyond this are refused before memory is asked for.
 const MOST_SIDE: usize = 16384;
+/// Texels of a cube's face beyond a right angle on each side: look-ups and their neighbours stay on it.
+pub const FACE_BORDER: f64 = 1.5;
+/// The smallest side of a cube's face: what is left without its border.
+pub const SMALLEST_FACE: usize = 8;
 /// Corners of a triangle's two sides.
 pub const CORNERS: usize = 6;
 
@@ -36,6 +40,9 @@ pub const CORNERS: usize = 6;
 pub enum Lookup {
     /// At the same place of the picture: the camera stands still. The texels are reflected radiance.
     Image,
+    /// On the six faces of a cube round the camera, which stays where it is and turns: +x, −x and +y in the first row, −y, +z and −z in the second. Texels
+    /// as with `image`; each face reaches [`FACE_BORDER`] texels beyond a right angle on each side.
+    Cube,
     /// In an atlas over the surfaces that stand still: the camera moves. The texels are what white matt surfaces would reflect.
     Atlas,
 }
@@ -82,8 +89,8 @@ pub struct Baked {
     pub header: Header,
     /// For each key frame the weights of the mean and of each component.
     pub weights: Vec<f32>,
-    /// Mean, components, sky: RGBA, layer by layer, rows from the top. With the look-up `image`, alpha of the mean is the logarithm to base 2 of the distance
-    /// from the camera, or [`NOWHERE`].
+    /// Mean, components, sky: RGBA, layer by layer, rows from the top. With the look-ups `image` and `cube`, alpha of the mean is the logarithm to base 2 of
+    /// the distance from the camera, or [`NOWHERE`].
     pub texels: Vec<f16>,
     /// With the look-up `atlas`, where the triangles of all objects that stand still are, object by object, in texels: six corners a triangle, those of the
     /// front (from where its corners go round against the clock, but for mirrored objects), then those of the back; zero for a triangle without area.
@@ -140,6 +147,10 @@ impl Header {
         let side = |n: usize| (1..=MOST_SIDE).contains(&n);
         if !side(self.width) || !side(self.height) || self.layers() > MOST_LAYERS {
             return Err(format!("{}×{} texels in {} layers cannot be used", self.width, self.height, self.layers()));
+        }
+        let face = self.height / 2;
+        if self.lookup == Lookup::Cube && (face < SMALLEST_FACE || [self.width, self.height] != [3 * face, 2 * face]) {
+            return Err("its texels are not the six faces of a cube".to_owned());
         }
         let increasing = self.keys.windows(2).all(|pair| pair[0] < pair[1]);
         let within = self.keys.iter().all(|key| (0.0..self.period_s).contains(key));
@@ -415,6 +426,10 @@ mod tests {
             let fault = Baked::from_bytes(&wrong.to_bytes().expect("writable")).expect_err("contradicts");
             assert!(matches!(fault, BakedError::Damaged { .. }), "atlas, edit {i}: {fault}");
         }
+        let mut wrong = baked();
+        wrong.header.lookup = Lookup::Cube;
+        let fault = Baked::from_bytes(&wrong.to_bytes().expect("writable")).expect_err("3×2 texels are no six faces");
+        assert!(fault.to_string().contains("cube"), "{fault}");
         let mut wrong = baked();
         wrong.weights[4] = f32::NAN;
         assert!(matches!(Baked::from_bytes(&wrong.to_bytes().expect("writable")), Err(BakedError::Damaged { .. })));

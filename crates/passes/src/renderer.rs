@@ -189,7 +189,7 @@ fn check_baked(plan: &Plan, settings: &Settings, scene: &Scene) -> Result<(), Di
     };
     baked.check_scene(scene).map_err(|e| fault(format!("the baked light cannot be used: {e}"), "the command is `manylight bake`"))?;
     let ((width, height), header) = (settings.size, &baked.header);
-    if header.lookup == Lookup::Atlas {
+    if header.lookup != Lookup::Image {
         return Ok(());
     }
     let (own, other) = (f64::from(width) / f64::from(height), header.width as f64 / header.height as f64);
@@ -218,8 +218,9 @@ pub fn plan_input(settings: &Settings, scene: &Scene) -> PlanInput {
 
 /// What the scene has, and what the light that was baked for it has.
 fn features(settings: &Settings, scene: &Scene) -> BTreeMap<String, bool> {
-    let is_atlas = settings.baked.as_ref().is_some_and(|baked| baked.header.lookup == Lookup::Atlas);
-    scene.features().into_iter().chain([("baked_atlas".to_owned(), is_atlas)]).collect()
+    let is = |lookup| settings.baked.as_ref().is_some_and(|baked| baked.header.lookup == lookup);
+    let of_light = [("baked_atlas", is(Lookup::Atlas)), ("baked_cube", is(Lookup::Cube))];
+    scene.features().into_iter().chain(of_light.map(|(name, has)| (name.to_owned(), has))).collect()
 }
 
 impl Renderer {

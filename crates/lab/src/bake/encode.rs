@@ -34,7 +34,7 @@ pub struct Parts<'a> {
     pub lit: &'a [Option<usize>],
     /// Light of the sky by day.
     pub sky: &'a Picture,
-    /// With the look-up `image`: distances from the camera; 0 where there is no surface.
+    /// With the look-ups `image` and `cube`: distances from the camera; 0 where there is no surface.
     pub distance: Option<&'a Picture>,
     /// With the look-up `atlas`: where the corners of triangles are, as in [`Baked`].
     pub corners: &'a [[f32; 2]],

@@ -11,7 +11,7 @@ mod study;
 mod tracer;
 
 use manylight_graph::diagnostics::Diagnostics;
-use manylight_passes::baked::{Baked, Lookup};
+use manylight_passes::Baked;
 use thiserror::Error;
 
 pub use atlas::atlas;
@@ -135,11 +135,8 @@ fn encoded(tracer: &mut Tracer<'_>, options: &Options, pca: &Pca, keys: &[f64], 
     if daylight > 0.0 {
         sky.data.iter_mut().for_each(|v| *v /= daylight);
     }
-    let (lookup, distance) = match tracer.atlas() {
-        Some(_) => (Lookup::Atlas, None),
-        None => (Lookup::Image, Some(tracer.distance()?)),
-    };
-    let header = header(tracer.scene(), lookup, options.period_s, options.subtract_mean, paths);
+    let distance = if tracer.atlas().is_none() { Some(tracer.distance()?) } else { None };
+    let header = header(tracer.scene(), tracer.task().domain.lookup(), options.period_s, options.subtract_mean, paths);
     let corners = tracer.atlas().map_or(&[][..], |atlas| &atlas.corners);
     let parts = Parts { keys, lit, sky: &sky, distance: distance.as_ref(), corners, header };
     Ok(encode(pca, options.keep, parts))

@@ -5,10 +5,19 @@ use std::{
     sync::Arc,
 };
 
+use glam::Vec3;
 use manylight_gpu::Gpu;
 use manylight_graph::library::Library;
-use manylight_passes::{Baked, Documents, Renderer, SceneSource, Settings, plan_input};
-use manylight_scene::{Scene, gpu_data::NO_TRIANGLE};
+use manylight_passes::{
+    Baked, Documents, Renderer, SceneSource, Settings,
+    baked::{FACE_BORDER, Lookup},
+    plan_input,
+};
+use manylight_scene::{
+    Scene,
+    gpu_data::NO_TRIANGLE,
+    motion::{CameraPose, Track},
+};
 
 use super::BakeError;
 use crate::{
@@ -47,11 +56,27 @@ pub enum Domain {
         /// Width and height.
         size: (u32, u32),
     },
+    /// Six faces of a cube, each of so many texels along a side, round a camera that turns.
+    Cube {
+        /// Width and height of a face.
+        side: u32,
+    },
     /// Both sides of all surfaces that stand still, for a camera that moves.
     Atlas {
         /// The most there may be.
         texels: u32,
     },
+}
+
+impl Domain {
+    /// How its light is found.
+    pub fn lookup(self) -> Lookup {
+        match self {
+            Self::Picture { .. } => Lookup::Image,
+            Self::Cube { .. } => Lookup::Cube,
+            Self::Atlas { .. } => Lookup::Atlas,
+        }
+    }
 }
 
 /// What is baked, and from what.
@@ -76,11 +101,14 @@ pub struct Tracer<'a> {
     task: Task<'a>,
     documents: Documents,
     scene: Scene,
+    /// Width and height of a key frame, and of each of the pictures that it is put together from.
     size: (u32, u32),
+    picture: (u32, u32),
     atlas: Option<Arc<Baked>>,
     /// Share of the texels that stand for a surface.
     used_share: f64,
-    renderer: Option<Renderer>,
+    /// Cameras of the pictures, with what renders them.
+    eyes: Vec<(Track<CameraPose>, Option<Renderer>)>,
     /// Frames that were traced, and frames that were there.
     pub traced: usize,
     /// Frames that were on disk.
@@ -94,21 +122,17 @@ impl<'a> Tracer<'a> {
     /// They have faults, or the scene cannot be baked.
     pub fn new(gpu: &'a Gpu, task: Task<'a>) -> Result<Self, BakeError> {
         let mut scene = task.source.load()?;
+        let cameras = cameras(&scene, task.domain)?;
         let is_atlas = matches!(task.domain, Domain::Atlas { .. });
-        if scene.camera.moves() && !is_atlas {
-            let message = format!(
-                "the camera of `{}` moves, and baked light of a picture is for one that stands still: bake it over the surfaces by --lookup atlas",
-                scene.name
-            );
-            return Err(BakeError::Input(message));
-        }
         let deforms: Vec<bool> = scene.meshes.iter().map(|mesh| mesh.deformation.is_some()).collect();
         scene.objects.retain(|object| !(object.pose.moves() || is_atlas && deforms[object.mesh]));
         if scene.objects.is_empty() {
             return Err(BakeError::Input(format!("every object of `{}` moves: there is nothing to bake", scene.name)));
         }
+        let of_pictures = "pipelines/bake/image.ron";
         let (pipeline, size, atlas, used_share) = match task.domain {
-            Domain::Picture { size } => ("pipelines/bake/image.ron", size, None, 1.0),
+            Domain::Picture { size } => (of_pictures, size, None, 1.0),
+            Domain::Cube { side } => (of_pictures, (3 * side, 2 * side), None, 1.0),
             Domain::Atlas { texels } => {
                 let atlas = super::atlas(&scene, texels)?;
                 let texels = manylight_passes::atlas::texels(&scene, &scene.sample(0.0), &atlas);
@@ -116,8 +140,10 @@ impl<'a> Tracer<'a> {
                 ("pipelines/bake/atlas.ron", (atlas.header.width as u32, atlas.header.height as u32), Some(Arc::new(atlas)), used)
             }
         };
+        let picture = if let Domain::Cube { side } = task.domain { (side, side) } else { size };
         let documents = Documents::load(task.library.clone(), Path::new(pipeline))?;
-        Ok(Self { gpu, task, documents, scene, size, atlas, used_share, renderer: None, traced: 0, found: 0 })
+        let eyes = cameras.into_iter().map(|camera| (camera, None)).collect();
+        Ok(Self { gpu, task, documents, scene, size, picture, atlas, used_share, eyes, traced: 0, found: 0 })
     }
 
     /// The scene without what moves. Its hash is that of the whole scene.
@@ -147,7 +173,7 @@ impl<'a> Tracer<'a> {
 
     /// Whether no light shines at a time: its key frame is black and is not traced.
     pub fn is_dark(&self, time: f64) -> bool {
-        self.scene.sample(time).lights.iter().all(|light| light.strength == glam::Vec3::ZERO)
+        self.scene.sample(time).lights.iter().all(|light| light.strength == Vec3::ZERO)
     }
 
     /// Light at a time. `paths` and `seed` are those of key frames but for comparisons.
@@ -164,20 +190,15 @@ impl<'a> Tracer<'a> {
         let plan = self.documents.plan(&plan_input(&settings, &self.scene))?;
         let version = env!("CARGO_PKG_VERSION");
         let corners = self.atlas.as_ref().map(|atlas| &atlas.corners);
-        let inputs = format!("{:016x} {time:?} {frames} {seed} {version} {corners:?}", self.scene.hash);
+        // Faces of a cube are pictures as well: their number is in the size.
+        let inputs = format!("{:016x} {time:?} {frames} {seed} {version} {width}×{height} {corners:?}", self.scene.hash);
         let name = facts::hash(&[&facts::fingerprint(&plan), &inputs]);
         let file = self.task.work.join(format!("{name}.exr"));
         if let Some(picture) = kept(&file, width as usize, height as usize) {
             self.found += 1;
             return Ok(picture);
         }
-        let renderer = self.renderer(settings)?;
-        for _ in 0..frames {
-            renderer.render_frame(time)?;
-            // Without waiting, all frames would be queued before the first is done.
-            renderer.wait_timings();
-        }
-        let picture = read(renderer, "composed")?;
+        let picture = self.pictures(&settings, "composed", (time, frames))?;
         write_exr(&file, &picture)?;
         self.traced += 1;
         Ok(picture)
@@ -189,15 +210,28 @@ impl<'a> Tracer<'a> {
     /// The frame cannot be rendered.
     pub fn distance(&mut self) -> Result<Picture, BakeError> {
         let settings = self.settings(Light::Sky, 1, SEED);
-        let renderer = self.renderer(settings)?;
-        renderer.render_frame(0.0)?;
-        read(renderer, "gbuffer_depth")
+        self.pictures(&settings, "gbuffer_depth", (0.0, 1))
+    }
+
+    /// What all cameras see at a time after so many frames, put together in two rows if they are several.
+    fn pictures(&mut self, settings: &Settings, resource: &str, (time, frames): (f64, u32)) -> Result<Picture, BakeError> {
+        let mut pictures = Vec::with_capacity(self.eyes.len());
+        for eye in 0..self.eyes.len() {
+            let renderer = self.renderer(eye, settings.clone())?;
+            for _ in 0..frames {
+                renderer.render_frame(time)?;
+                // Without waiting, all frames would be queued before the first is done.
+                renderer.wait_timings();
+            }
+            pictures.push(read(renderer, resource)?);
+        }
+        Ok(if pictures.len() == 1 { pictures.remove(0) } else { in_two_rows(&pictures) })
     }
 
     fn settings(&self, light: Light, paths: u32, seed: u32) -> Settings {
         let set = [("component", light.component().to_owned()), ("paths", paths.to_string())];
         Settings {
-            size: self.size,
+            size: self.picture,
             set: set.map(|(name, value)| (name.to_owned(), value)).to_vec(),
             keep: self.atlas.is_none().then(|| "gbuffer_depth".to_owned()).into_iter().collect(),
             seed,
@@ -206,9 +240,10 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// A renderer whose next frame is its first.
-    fn renderer(&mut self, settings: Settings) -> Result<&mut Renderer, BakeError> {
-        let renderer = match self.renderer.take() {
+    /// The renderer of a camera, whose next frame is its first.
+    fn renderer(&mut self, eye: usize, settings: Settings) -> Result<&mut Renderer, BakeError> {
+        let (camera, known) = &mut self.eyes[eye];
+        let renderer = match known.take() {
             Some(mut renderer) => {
                 if renderer.settings().set != settings.set || renderer.settings().seed != settings.seed {
                     renderer.set(settings)?;
@@ -216,10 +251,51 @@ impl<'a> Tracer<'a> {
                 renderer.restart();
                 renderer
             }
-            None => Renderer::with(self.gpu, self.documents.clone(), self.task.source.clone(), self.scene.clone(), settings)?,
+            None => {
+                let scene = Scene { camera: camera.clone(), ..self.scene.clone() };
+                Renderer::with(self.gpu, self.documents.clone(), self.task.source.clone(), scene, settings)?
+            }
         };
-        Ok(self.renderer.insert(renderer))
+        Ok(known.insert(renderer))
     }
+}
+
+/// The cameras whose pictures are a key frame.
+fn cameras(scene: &Scene, domain: Domain) -> Result<Vec<Track<CameraPose>>, BakeError> {
+    let keys = scene.camera.keys();
+    let origin = keys[0].1.origin;
+    match domain {
+        Domain::Picture { .. } if scene.camera.moves() => Err(BakeError::Input(format!(
+            "the camera of `{}` moves, and a picture is for one that stands still: bake with --lookup cube for one that only turns, or with --lookup atlas",
+            scene.name
+        ))),
+        Domain::Cube { .. } if keys.iter().any(|key| key.1.origin != origin) => Err(BakeError::Input(format!(
+            "the camera of `{}` goes from place to place, and a cube is for one that only turns: bake with --lookup atlas",
+            scene.name
+        ))),
+        Domain::Cube { side } => {
+            Ok([Vec3::X, Vec3::Y, Vec3::Z].into_iter().flat_map(|axis| [axis, -axis]).map(|axis| face(origin, axis, side)).collect())
+        }
+        _ => Ok(vec![scene.camera.clone()]),
+    }
+}
+
+/// The camera of a cube's face. `precomputed/cube` finds directions on it.
+fn face(origin: Vec3, axis: Vec3, side: u32) -> Track<CameraPose> {
+    let side = f64::from(side);
+    let fov_x_deg = (2.0 * (side / (side - 2.0 * FACE_BORDER)).atan()).to_degrees() as f32;
+    let up = if axis.y == 0.0 { Vec3::Y } else { Vec3::Z };
+    Track::fixed(CameraPose { origin, target: origin + axis, up, fov_x_deg })
+}
+
+/// Pictures of one size side by side, half of them below the others.
+fn in_two_rows(pictures: &[Picture]) -> Picture {
+    let (width, height, channels) = (pictures[0].width, pictures[0].height, pictures[0].channels());
+    let columns = pictures.len() / 2;
+    let rows = pictures.chunks(columns).flat_map(|row| {
+        (0..height).flat_map(move |y| row.iter().flat_map(move |picture| &picture.data[y * width * channels..(y + 1) * width * channels]))
+    });
+    Picture { width: columns * width, height: 2 * height, data: rows.copied().collect(), ..pictures[0].clone() }
 }
 
 fn read(renderer: &Renderer, name: &str) -> Result<Picture, BakeError> {

@@ -20,6 +20,8 @@ pub enum CriterionArg {
 pub enum LookupArg {
     /// At its place in the picture: for a camera that stands still.
     Image,
+    /// On six faces of a cube round the camera: for one that turns.
+    Cube,
     /// In an atlas over the surfaces: for a camera that moves.
     Atlas,
 }
@@ -46,6 +48,9 @@ pub struct BakeArgs {
     /// With the look-up `image`: size of the key frames in pixels; pictures of other sizes and the same proportions are interpolated [default: 160x120]
     #[arg(long, value_name = "WxH", value_parser = values::size)]
     pub size: Option<(u32, u32)>,
+    /// With the look-up `cube`: texels along a side of each face [default: 64]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=2048))]
+    pub side: Option<u32>,
     /// With the look-up `atlas`: the most texels of a key frame, over both sides of all surfaces [default: 32768]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=16_777_216))]
     pub texels: Option<u32>,

@@ -22,6 +22,8 @@ const DEFAULT_VARIANCE: f64 = 0.986;
 
 /// Of key frames in pixels.
 const DEFAULT_SIZE: (u32, u32) = (160, 120);
+/// Of a cube's faces in texels.
+const DEFAULT_SIDE: u32 = 64;
 /// Most texels of key frames that are an atlas.
 const DEFAULT_TEXELS: u32 = 32_768;
 
@@ -63,13 +65,19 @@ pub fn run(cli: &Cli, args: &BakeArgs) -> Result<(), Fault> {
 
 /// What light is traced at.
 fn domain(args: &BakeArgs) -> Result<Domain, Fault> {
-    match (args.lookup, args.size, args.texels) {
-        (LookupArg::Image, size, None) => Ok(Domain::Picture { size: size.unwrap_or(DEFAULT_SIZE) }),
-        (LookupArg::Atlas, None, texels) => Ok(Domain::Atlas { texels: texels.unwrap_or(DEFAULT_TEXELS) }),
-        (LookupArg::Image, ..) => {
-            Err(Fault::Input("--texels is of the look-up `atlas`: add --lookup atlas, or give --size instead".to_owned()))
+    let given =
+        [("--size", "image", args.size.is_some()), ("--side", "cube", args.side.is_some()), ("--texels", "atlas", args.texels.is_some())];
+    let (own, domain) = match args.lookup {
+        LookupArg::Image => ("image", Domain::Picture { size: args.size.unwrap_or(DEFAULT_SIZE) }),
+        LookupArg::Cube => ("cube", Domain::Cube { side: args.side.unwrap_or(DEFAULT_SIDE) }),
+        LookupArg::Atlas => ("atlas", Domain::Atlas { texels: args.texels.unwrap_or(DEFAULT_TEXELS) }),
+    };
+    match given.into_iter().find(|(_, lookup, is_given)| *is_given && *lookup != own) {
+        None => Ok(domain),
+        Some((option, lookup, _)) => {
+            let remedy = given.into_iter().find(|(_, lookup, _)| *lookup == own).map_or("", |(option, ..)| option);
+            Err(Fault::Input(format!("{option} is of the look-up `{lookup}`: add --lookup {lookup}, or give {remedy} instead")))
         }
-        (LookupArg::Atlas, ..) => Err(Fault::Input("--size is of the look-up `image`: an atlas has --texels instead".to_owned())),
     }
 }
 
