@@ -1,17 +1,14 @@
-//! Light and its transport: fall-off, form factors, reflection, the sky, precomputed light.
+//! Light and its transport: fall-off, form factors, reflection, the sky.
 
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
-use half::f16;
-use manylight_graph::value::Format;
-use manylight_passes::baked::{Baked, Header, Lookup};
 use manylight_scene::gpu_data::Sky;
 use proptest::strategy::Strategy;
 
 use super::{
     directions::v3,
-    harness::{Bound, Case, EXACT, Resource, Want, absolute, check, ulps, values, values_of},
+    harness::{Bound, Case, EXACT, Resource, Want, check, ulps, values, values_of},
     inputs::{LARGEST, Numbers, colour, index, join, magnitude, magnitude_or_zero, one_of, real, switch, unit_vector, vector},
 };
 
@@ -356,100 +353,7 @@ fn surroundings() -> Vec<Case> {
                 },
             )
     };
-    let mut all = vec![of_sky(sky(1, 0.5)), of_sky(sky(1, 3.0)), of_sky(sky(0, 1.0))];
-    all.extend(midnight());
-    all
-}
-
-/// Precomputed light at times around midnight: the last key frame of a day, half way to the first of the next, and others.
-fn midnight() -> Vec<Case> {
-    const WIDTH: usize = 16;
-    let header = Header {
-        scene: "day".into(),
-        scene_hash: String::new(),
-        lookup: Lookup::Image,
-        width: WIDTH,
-        height: WIDTH,
-        triangles: 0,
-        components: 2,
-        keys: vec![7200.0, 36_000.0, 79_200.0],
-        period_s: 86_400.0,
-        kept_variance: vec![0.9, 0.99],
-        mean_subtracted: true,
-        dark_keys: 0,
-        sky_scale: 2.5,
-        paths: 16,
-        manylight: String::new(),
-    };
-    let weights: Vec<f32> = vec![1.0, 0.5, -0.25, 1.0, 2.0, 0.125, 1.0, -1.0, 1.0];
-    let texels: Vec<f16> =
-        (0..4 * WIDTH * WIDTH * 4).map(|i| f16::from_f64(f64::from(super::random::hash(i as u32) % 1000) / 500.0 - 0.5)).collect();
-    let layers: Vec<Vec<f16>> = texels.chunks(4 * WIDTH * WIDTH).map(<[f16]>::to_vec).collect();
-    let baked = Baked { header, weights: weights.clone(), texels, corners: Vec::new() };
-    let midnight = 86_400.0;
-    let now = baked.weights_at(50_000.0, 1.0);
-    let reads = [
-        Resource::buffer("baked_weights", "f32", &now),
-        Resource::texture_array("baked_light", Format::Rgba16Float, (WIDTH as u32, WIDTH as u32), &layers),
-    ];
-    let shown = layers.clone();
-    let others = [
-        Case::new("baked::baked_layers", "with_sky: bool")
-            .gives("u32")
-            .reads(&reads[..1])
-            .edges([vec![0.0], vec![1.0]])
-            .twin(EXACT, |i| values([3.0 + i[0]])),
-        Case::new("baked::baked_light_at", "place: vec2f, with_sky: bool")
-            .gives("vec3f")
-            .reads(&reads)
-            .edges([[0.0, 0.0], [16.0, 16.0], [0.5, 15.5], [8.5, 3.5], [8.0, 3.0]].map(|p| vec![p[0], p[1], 1.0]))
-            .random(join([real(0.0, WIDTH as f64), real(0.0, WIDTH as f64), switch()]))
-            .twin(
-                absolute(0.06, "devices interpolate between texels in steps of 1/256 of values that differ by up to 2, in four layers"),
-                move |i| {
-                    let side = WIDTH as f64;
-                    let texel = |layer: usize, x: f64, y: f64| {
-                        let at = 4 * (x.clamp(0.0, side - 1.0) as usize + WIDTH * y.clamp(0.0, side - 1.0) as usize);
-                        DVec3::from_array([0, 1, 2].map(|c| shown[layer][at + c].to_f64()))
-                    };
-                    let (x, y) = (i[0] - 0.5, i[1] - 0.5);
-                    let row = |layer: usize, y: f64| texel(layer, x.floor(), y).lerp(texel(layer, x.floor() + 1.0, y), x - x.floor());
-                    let light = |layer: usize| row(layer, y.floor()).lerp(row(layer, y.floor() + 1.0), y - y.floor());
-                    let sum: DVec3 = (0..3 + i[2] as usize).map(|layer| f64::from(now[layer]) * light(layer)).sum();
-                    values(sum.max(DVec3::ZERO).to_array())
-                },
-            ),
-    ];
-    let nights = [
-        (79_200.0, 2, 0, 0.0),
-        (midnight, 2, 0, 0.5),
-        (0.0, 2, 0, 0.5),
-        (midnight - 1e-3, 2, 0, 0.5 - 1e-3 / 14_400.0),
-        (7199.0, 2, 0, 1.0 - 1.0 / 14_400.0),
-        (7200.0, 0, 1, 0.0),
-    ]
-    .map(|(time, before, after, alpha)| {
-        let daylight = 0.25;
-        let texel_layers = layers.clone();
-        let row = |key: usize| DVec3::new(weights[3 * key].into(), weights[3 * key + 1].into(), weights[3 * key + 2].into());
-        // [PCA] eq. 2, of the light of both key frames.
-        let [from, to] = [row(before), row(after)];
-        Case::new("baked::baked_texel", "texel: vec2u, with_sky: bool")
-            .gives("vec3f")
-            .reads(&[
-                Resource::buffer("baked_weights", "f32", &baked.weights_at(time, daylight)),
-                Resource::texture_array("baked_light", Format::Rgba16Float, (WIDTH as u32, WIDTH as u32), &layers),
-            ])
-            .random(join([index(WIDTH as u32), index(WIDTH as u32), switch()]))
-            .twin(absolute(2e-6, "weights are rounded once; a sum of four terms up to 4"), move |i| {
-                let at = 4 * (i[0] as usize + WIDTH * i[1] as usize);
-                let light = |layer: usize| DVec3::from_array([0, 1, 2].map(|c| texel_layers[layer][at + c].to_f64()));
-                let of_key = |w: DVec3| w.x * light(0) + w.y * light(1) + w.z * light(2);
-                let sky = i[2] * 2.5 * daylight * light(3);
-                values(((1.0 - alpha) * of_key(from) + alpha * of_key(to) + sky).max(DVec3::ZERO).to_array())
-            })
-    });
-    nights.into_iter().chain(others).collect()
+    vec![of_sky(sky(1, 0.5)), of_sky(sky(1, 3.0)), of_sky(sky(0, 1.0))]
 }
 
 #[test]

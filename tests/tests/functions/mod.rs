@@ -7,6 +7,7 @@ mod light;
 mod maps;
 mod nodes;
 mod paths;
+mod precomputed;
 mod random;
 mod rays;
 mod scene;
@@ -20,10 +21,20 @@ use harness::{Case, modules};
 use crate::support::root;
 
 fn cases() -> Vec<Case> {
-    [random::cases(), directions::cases(), light::cases(), series::cases(), maps::cases(), rays::cases(), paths::cases(), surface::cases()]
-        .into_iter()
-        .flatten()
-        .collect()
+    [
+        random::cases(),
+        directions::cases(),
+        light::cases(),
+        series::cases(),
+        maps::cases(),
+        rays::cases(),
+        paths::cases(),
+        surface::cases(),
+        precomputed::cases(),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// `module::function` of all functions in `shaders/common`.
@@ -71,6 +82,10 @@ const FAULTS: &[(&str, &str, &str)] = &[
     ("bvh::intersect", "l < MISSED || r < MISSED", "l < MISSED"),
     ("path::weighted_direct", "pdf_light(y, arrival), 1e-30", "2.0 * pdf_light(y, arrival), 1e-30"),
     ("metric::cluster_distance", "select(abs(cosine), cosine", "select(cosine, cosine"),
+    ("baked::is_baked", "return (distance <= 0.0) == (baked >= NOWHERE);", "return false;"),
+    ("baked::is_between", "inverse += weights.x * weights.y", "inverse += weights.x"),
+    ("baked::tap", "any(texel < vec2i(0)) || ", ""),
+    ("baked::seen_light", "i / 3 - 1", "i / 3"),
     ("view::pixel_solid_angle", "cosine * cosine * cosine", "cosine * cosine"),
 ];
 
