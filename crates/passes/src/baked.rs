@@ -127,12 +127,12 @@ pub fn hash_of(scene: &Scene) -> String {
 impl Header {
     /// Layers of the texture: mean, components, sky.
     pub fn layers(&self) -> usize {
-        self.components + 2
+        self.components.saturating_add(2)
     }
 
     /// Numbers in a row of weights: of the mean and the components.
     pub fn columns(&self) -> usize {
-        self.components + 1
+        self.components.saturating_add(1)
     }
 
     /// Corners of all triangles.
@@ -397,12 +397,13 @@ mod tests {
     /// Headers that were written so, with a true checksum: no size in them is believed.
     #[test]
     fn a_header_that_contradicts_the_file_is_refused() {
-        let edits: [fn(&mut Header); 8] = [
+        let edits: [fn(&mut Header); 9] = [
             |h| h.width = 4,
             |h| h.height = 1,
             |h| h.width = usize::MAX,
             |h| h.components = 3,
             |h| h.components = 100_000,
+            |h| h.components = usize::MAX,
             |h| h.keys.clear(),
             |h| h.keys.swap(0, 1),
             |h| h.keys[3] = 86_400.0,
