@@ -20,7 +20,7 @@ use manylight_passes::{Documents, Renderer, SceneSource, Settings, load_registry
 use manylight_scene::Scene;
 
 use crate::{
-    renders::{Job, gpu},
+    renders::{Job, gpu, lights_to_show},
     support::{project_with, root},
 };
 
@@ -237,11 +237,14 @@ impl<'a> Subject<'a> {
             return Ok(None);
         }
         settings.debug.watch_numbers = true;
-        let told = |what: String| format!("on {}, {}: {what}", scene.name, words(&settings));
-        let mut renderer = Renderer::with(gpu(), self.documents.clone(), source.clone(), scene.clone(), settings.clone())
-            .map_err(|e| told(e.to_string()))?;
-        for frame in 0..FRAMES {
-            renderer.render_frame(f64::from(frame) * STEP).map_err(|e| told(e.to_string()))?;
+        for light in lights_to_show(self.documents, scene, SIZE) {
+            let settings = Settings { baked: light, ..settings.clone() };
+            let told = |what: String| format!("on {}, {}: {what}", scene.name, words(&settings));
+            let mut renderer = Renderer::with(gpu(), self.documents.clone(), source.clone(), scene.clone(), settings.clone())
+                .map_err(|e| told(e.to_string()))?;
+            for frame in 0..FRAMES {
+                renderer.render_frame(f64::from(frame) * STEP).map_err(|e| told(e.to_string()))?;
+            }
         }
         Ok(Some(()))
     }
@@ -252,7 +255,8 @@ fn switch() -> Vec<String> {
 }
 
 pub fn words(settings: &Settings) -> String {
-    settings.set.iter().map(|(name, value)| format!("--set {name}={value}")).collect::<Vec<_>>().join(" ")
+    let lookup = settings.baked.iter().map(|light| format!("with the look-up {:?}", light.header.lookup));
+    settings.set.iter().map(|(name, value)| format!("--set {name}={value}")).chain(lookup).collect::<Vec<_>>().join(" ")
 }
 
 /// Whether a parameter does nothing but turn on and off nodes that write what is presented.

@@ -5,9 +5,14 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
+use half::f16;
 use manylight_gpu::{Gpu, GpuOptions, Image};
 use manylight_graph::{library::Library, plan::Debug};
-use manylight_passes::{Baked, Renderer, SceneSource, Settings};
+use manylight_passes::{
+    Baked, Documents, Renderer, SceneSource, Settings,
+    baked::{CORNERS, Header, Lookup, NOWHERE, hash_of},
+};
+use manylight_scene::Scene;
 
 use crate::support::root;
 
@@ -111,6 +116,38 @@ impl Job {
 #[track_caller]
 pub fn read(renderer: &Renderer, resource: &str) -> Image {
     renderer.read(resource).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Whether a pipeline shows light that was traced before: then its picture is what the file says.
+pub fn shows_baked_light(documents: &Documents) -> bool {
+    documents.pipeline().nodes.values().any(|node| node.node.text.starts_with("precomputed/"))
+}
+
+/// What a pipeline is to be given as precomputed light of a scene: nothing, or, where it shows such, light of each way of look-up.
+pub fn lights_to_show(documents: &Documents, scene: &Scene, size: (u32, u32)) -> Vec<Option<Arc<Baked>>> {
+    if shows_baked_light(documents) {
+        [Lookup::Image, Lookup::Cube, Lookup::Atlas].map(|lookup| Some(Arc::new(made_up(lookup, scene, size)))).into()
+    } else {
+        vec![None]
+    }
+}
+
+/// Light that nobody traced: of the brightness of a bright room, and far away in every other texel. In an atlas, every third triangle is not there.
+fn made_up(lookup: Lookup, scene: &Scene, size: (u32, u32)) -> Baked {
+    let (width, height) = if lookup == Lookup::Cube { (24, 16) } else { size };
+    let still = scene.objects.iter().filter(|object| lookup == Lookup::Atlas && scene.stands_still(object));
+    let triangles: usize = still.map(|object| scene.meshes[object.mesh].triangles.len()).sum();
+    let header = serde_json::json!({
+        "scene": scene.name, "scene_hash": hash_of(scene), "lookup": lookup, "triangles": triangles, "width": width, "height": height, "components": 1,
+        "keys": [0.0], "period_s": 10.0, "kept_variance": [1.0], "mean_subtracted": true, "dark_keys": 0, "sky_scale": 1.0, "paths": 1,
+        "manylight": "",
+    });
+    let header: Header = serde_json::from_value(header).expect("a header");
+    let texel = |i: usize| if i % 8 == 3 { NOWHERE } else { 2.5 };
+    let texels = (0..header.layers() * header.width * header.height * 4).map(|i| f16::from_f32(texel(i))).collect();
+    let place = |i: usize| [(7 * i % header.width) as f32 + 0.5, (5 * i % header.height) as f32 + 0.5];
+    let corners = (0..header.corners()).map(|i| if (i / CORNERS).is_multiple_of(3) { [0.0; 2] } else { place(i) }).collect();
+    Baked { weights: vec![1.0; header.keys.len() * header.columns()], texels, corners, header }
 }
 
 /// A cluster as the graph's buffer holds it.
