@@ -256,7 +256,7 @@ fn every_pipeline_stays_stable_on_hard_scenes() {
     for (path, documents) in documents_of_all_pipelines() {
         let subject = Subject::new(&documents, &scenes);
         let mut pictures: BTreeMap<&str, Image> = BTreeMap::new();
-        let (mut tried, mut refused, mut worst) = (0, 0, BTreeMap::new());
+        let (mut tried, mut refused, mut on_scenes, mut worst) = (0, 0, 0, BTreeMap::new());
         for (case, scene) in cases.iter().zip(&scenes) {
             let small = subject.small();
             match subject.plan(&Settings { size: SIZE, set: small.clone(), ..Settings::default() }, &scene.1) {
@@ -273,6 +273,7 @@ fn every_pipeline_stays_stable_on_hard_scenes() {
             let mut images = Vec::new();
             for light in lights_to_show(&documents, &scene.1, SIZE) {
                 tried += 1;
+                on_scenes += 1;
                 match render(&subject, scene, &small, light) {
                     Ok(image) => images.push(image),
                     Err(told) => faults.push(format!("{path} {told}")),
@@ -320,8 +321,12 @@ fn every_pipeline_stays_stable_on_hard_scenes() {
             }
         }
         println!("{path}: {tried} renders, {refused} refused, differences {worst:?}");
-        record.push(serde_json::json!({ "pipeline": path, "renders": tried, "refused": refused, "differences": worst }));
+        record.push(serde_json::json!({
+            "pipeline": path, "scenes": on_scenes, "renders": tried, "refused": refused, "differences": worst,
+        }));
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
     records::write("hard_scenes", &record);
+    let adapter = gpu().adapter_info();
+    records::write("adapter", &[serde_json::json!({ "adapter": adapter.name, "driver": adapter.driver_info })]);
 }

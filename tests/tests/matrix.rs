@@ -20,6 +20,7 @@ use manylight_passes::{Documents, Renderer, SceneSource, Settings, load_registry
 use manylight_scene::Scene;
 
 use crate::{
+    records,
     renders::{Job, gpu, lights_to_show},
     support::{project_with, root},
 };
@@ -338,43 +339,52 @@ fn stages(documents: &Documents) -> Option<Vec<String>> {
 }
 
 /// The pipelines in `pipelines/`, without stages and such, whatever there is.
+pub fn pipelines() -> Vec<String> {
+    let part = |path: &String| path["pipelines/".len()..].contains('/');
+    Library::new(Some(root()), Vec::new()).list("pipelines", "ron").into_iter().filter(|path| !part(path)).collect()
+}
+
+/// All of [`pipelines`].
 pub fn documents_of_all_pipelines() -> Vec<(String, Documents)> {
     let library = Library::new(Some(root()), Vec::new());
     let (registry, found) = load_registry(&library);
-    let part = |path: &String| path["pipelines/".len()..].contains('/');
     let load = |path: String| {
         let documents = Documents::with(library.clone(), registry.clone(), found.clone(), Path::new(&path));
         (path, documents.unwrap_or_else(|faults| panic!("{}", faults.render())))
     };
-    library.list("pipelines", "ron").into_iter().filter(|path| !part(path)).map(load).collect()
+    pipelines().into_iter().map(load).collect()
 }
 
-/// Plans and renders a pipeline in all ways; returns a line for people, and the faults.
-fn try_all(subject: &Subject<'_>, most: usize, seed: u64) -> (String, Vec<String>) {
-    let (mut chance, mut faults, start) = (Chance(seed), Vec::new(), Instant::now());
+/// How many combinations of a pipeline's options were tried, and what came of them.
+#[derive(Default)]
+struct Tried {
+    /// Accepted by the planner on all scenes.
+    planned: usize,
+    /// Refused with a reason.
+    refused: usize,
+    /// Pictures.
+    rendered: usize,
+    /// Of those that were to be rendered, refused for their numbers.
+    without: usize,
+}
+
+/// Plans and renders a pipeline in all ways; returns the counts, and the faults.
+fn try_all(subject: &Subject<'_>, most: usize, seed: u64) -> (Tried, Vec<String>) {
+    let (mut chance, mut faults) = (Chance(seed), Vec::new());
     let (accepted, refused) = subject.plan_all(most, &mut chance, &mut faults);
-    let planned = start.elapsed();
     let rows = if faults.is_empty() { subject.pairs(&accepted, &mut chance) } else { Vec::new() };
-    let (mut rendered, mut without) = (0, 0);
+    let mut tried = Tried { planned: accepted.len(), refused, ..Tried::default() };
     for (row, scene) in rows.iter().flat_map(|row| subject.scenes.iter().map(move |scene| (row, scene))) {
         match subject.render(row, scene) {
-            Ok(Some(())) => rendered += 1,
-            Ok(None) => without += 1,
+            Ok(Some(())) => tried.rendered += 1,
+            Ok(None) => tried.without += 1,
             Err(told) => faults.push(told),
         }
         if faults.len() >= MOST_TOLD {
             break;
         }
     }
-    let rendering = start.elapsed() - planned;
-    let line = format!(
-        "{} planned in {:.1} s, {refused} refused, {rendered} of {} rendered in {:.1} s, {without} of them refused for their numbers",
-        accepted.len(),
-        planned.as_secs_f64(),
-        rows.len() * subject.scenes.len(),
-        rendering.as_secs_f64(),
-    );
-    (line, faults)
+    (tried, faults)
 }
 
 #[test]
@@ -382,11 +392,16 @@ fn every_combination_of_options_renders_finite_numbers_or_is_refused_with_a_reas
     let folder = tempfile::tempdir().expect("temporary folder");
     let scenes = scenes(folder.path());
     let mut all: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    let mut seen = BTreeSet::new();
+    let (mut seen, mut record) = (BTreeSet::new(), Vec::new());
     for (path, documents) in documents_of_all_pipelines() {
-        let again = stages(&documents).is_some_and(|stages| !seen.insert(stages));
-        let (line, faults) = try_all(&Subject::new(&documents, &scenes), if again { MOST_AGAIN } else { MOST_PLANNED }, 7);
-        println!("{path}: {line}");
+        let (again, start) = (stages(&documents).is_some_and(|stages| !seen.insert(stages)), Instant::now());
+        let (tried, faults) = try_all(&Subject::new(&documents, &scenes), if again { MOST_AGAIN } else { MOST_PLANNED }, 7);
+        let Tried { planned, refused, rendered, without } = tried;
+        let seconds = start.elapsed().as_secs_f64();
+        println!("{path}: {planned} planned, {refused} refused, {rendered} rendered, {without} refused for their numbers, {seconds:.1} s");
+        record.push(serde_json::json!({
+            "pipeline": path, "planned": planned, "refused": refused, "rendered": rendered, "refused_for_numbers": without,
+        }));
         if !faults.is_empty() {
             all.insert(path, faults);
         }
@@ -394,6 +409,7 @@ fn every_combination_of_options_renders_finite_numbers_or_is_refused_with_a_reas
     let told: Vec<String> =
         all.iter().flat_map(|(path, faults)| faults.iter().take(MOST_TOLD).map(move |fault| format!("{path} {fault}"))).collect();
     assert!(told.is_empty(), "{}", told.join("\n"));
+    records::write("combinations", &record);
 }
 
 /// The scan sees what it is there for: one texel of one node that divides by zero, or takes away light that is not there.

@@ -38,7 +38,7 @@ fn cases() -> Vec<Case> {
 }
 
 /// `module::function` of all functions in `shaders/common`.
-fn functions() -> BTreeSet<String> {
+pub fn functions() -> BTreeSet<String> {
     let mut all = BTreeSet::new();
     for path in modules() {
         let text = fs::read_to_string(root().join(&path)).unwrap_or_else(|e| panic!("{path}: {e}"));

@@ -2,10 +2,10 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
-    path::Path,
     sync::{Mutex, PoisonError},
 };
+
+use crate::records;
 
 /// What a result must be.
 #[derive(Debug, Clone)]
@@ -164,9 +164,6 @@ fn error(want: &Want, got: f64, unit: Unit) -> f64 {
     }
 }
 
-/// The folder that a record of all comparisons is written to, when this variable is set.
-const RECORD_FOLDER: &str = "MANYLIGHT_RECORD_NUMBERS";
-
 /// Records outcomes, and fails with everything that is beyond its bound.
 pub fn judge(outcomes: Vec<Outcome>) {
     record(&outcomes);
@@ -180,25 +177,17 @@ pub fn judge(outcomes: Vec<Outcome>) {
     assert!(bad.is_empty(), "{} of {} functions are not as their twins:\n{}", bad.len(), outcomes.len(), bad.join("\n"));
 }
 
-/// Adds outcomes to the record, which is one array of objects in `functions.json`, by the names of the functions.
+/// Adds outcomes to the record, by the names of the functions.
 fn record(outcomes: &[Outcome]) {
     static ALL: Mutex<BTreeMap<&str, Outcome>> = Mutex::new(BTreeMap::new());
-    let Some(folder) = std::env::var_os(RECORD_FOLDER) else { return };
     let mut all = ALL.lock().unwrap_or_else(PoisonError::into_inner);
     all.extend(outcomes.iter().map(|o| (o.function, o.clone())));
-    let rows: Vec<serde_json::Value> = all
-        .values()
-        .map(|o| {
-            let Bound { limit, unit, reason } = o.bound;
-            // A number that JSON lacks is a failure of the test, which says more.
-            serde_json::json!({
-                "function": o.function, "inputs": o.inputs, "worst": o.worst, "unit": unit.name(), "bound": limit, "reason": reason,
-            })
+    let row = |o: &Outcome| {
+        let Bound { limit, unit, reason } = o.bound;
+        // A number that JSON lacks is a failure of the test, which says more.
+        serde_json::json!({
+            "function": o.function, "inputs": o.inputs, "worst": o.worst, "unit": unit.name(), "bound": limit, "reason": reason,
         })
-        .collect();
-    let folder = Path::new(&folder);
-    fs::create_dir_all(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
-    let path = folder.join("functions.json");
-    let text = serde_json::to_string_pretty(&rows).expect("rows are plain");
-    fs::write(&path, text + "\n").unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    };
+    records::write("functions", &all.values().map(row).collect::<Vec<_>>());
 }
