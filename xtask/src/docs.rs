@@ -1,5 +1,5 @@
 //! What of the book is generated: one page a node, from the declarations by `manylight nodes --format markdown`; one page a sweep, from the records
-//! in docs/records by `manylight sweep --report --markdown`.
+//! in docs/records by `manylight sweep --report --markdown`; the tables of errors and stability, from the records of `cargo xtask numbers`.
 
 use std::{
     collections::BTreeMap,
@@ -8,13 +8,15 @@ use std::{
 };
 
 use crate::{
-    links,
+    links, numbers,
     shell::{Shell, Stop},
 };
 
 const PAGES: &str = "docs/src/nodes";
 const RECORDS: &str = "docs/records";
 const RESULTS: &str = "docs/src/results/sweeps";
+/// Pages of which parts are tables of errors and stability.
+const WITH_TABLES: [&str; 2] = ["docs/src/methods/stability.md", "docs/src/results/numbers.md"];
 const SUMMARY: &str = "docs/src/SUMMARY.md";
 const INDEX_LINE: &str = "(nodes/index.md)";
 
@@ -83,6 +85,11 @@ fn reference(shell: &Shell, program: &str) -> Result<BTreeMap<PathBuf, String>, 
     files.insert(Path::new(PAGES).join("index.md"), index(&nodes));
     files.insert(PathBuf::from(SUMMARY), summary);
     files.extend(results(shell, program)?);
+    let tables = numbers::tables(&shell.root)?;
+    for page in WITH_TABLES {
+        let text = std::fs::read_to_string(shell.root.join(page)).map_err(|e| Stop::failed(format!("{page}: {e}")))?;
+        files.insert(PathBuf::from(page), numbers::with_tables(&text, &tables).map_err(|e| Stop::failed(format!("{page}: {e}")))?);
+    }
     Ok(files)
 }
 
@@ -92,7 +99,7 @@ fn results(shell: &Shell, program: &str) -> Result<BTreeMap<PathBuf, String>, St
     let pages = shell.root.join("target/docs/pages");
     let _ = std::fs::remove_dir_all(shell.root.join("target/docs"));
     let mut files = BTreeMap::new();
-    for name in names(&shell.root.join(RECORDS))? {
+    for name in names(&shell.root.join(RECORDS))?.into_iter().filter(|name| name != numbers::FOLDER) {
         // The command writes beside the records: into a copy of them.
         let copy = shell.root.join("target/docs").join(&name);
         let records = shell.root.join(RECORDS).join(&name).join("records.jsonl");

@@ -6,11 +6,14 @@
 //! - [`setup`], [`vulkan`], [`packages`]: finding or installing a C++ compiler and a Vulkan driver
 //! - [`demo`]: the first picture
 //! - [`test`]: everything continuous integration checks; [`package`] is one of its steps
-//! - [`docs`], [`links`]: the node reference and the book
+//! - [`docs`], [`links`]: the node reference and the book; [`numbers`]: how exact and stable the methods are, for the book
+//! - [`json`]: what other programs and tests write
 
 mod demo;
 mod docs;
+mod json;
 mod links;
+mod numbers;
 mod package;
 mod packages;
 mod setup;
@@ -30,8 +33,10 @@ Commands:
                                    (default: --size 512x512 --out out/demo.png)
   test [--quick]                   set up, then run every check of continuous integration;
                                    --quick leaves out doc tests, documentation, demo, licences and packages
-  docs [--check]                   write the node reference into docs/src/nodes and build the book;
-                                   --check changes nothing and fails when the reference is stale
+  docs [--check]                   write the node reference and the tables of the book, and build the book;
+                                   --check changes nothing and fails when one of them is stale
+  numbers                          run the tests that measure errors and stability, and keep what they
+                                   record in docs/records/numbers for the book (some minutes)
   setup [--software]               make sure that there are a C++ compiler and a usable Vulkan driver;
                                    --software installs the software driver even beside a hardware one
 
@@ -60,6 +65,12 @@ fn run(arguments: &[String]) -> Result<(), Stop> {
         "demo" => demo::demo(&shell, &demo::Options::parse(rest)?),
         "test" => test::test(&shell, flag(rest, "--quick")?),
         "docs" => docs::docs(&shell, flag(rest, "--check")?),
+        "numbers" => {
+            if let Some(word) = rest.first() {
+                return Err(Stop::usage(format!("unexpected argument `{word}`")));
+            }
+            numbers::numbers(&shell)
+        }
         "setup" => setup::setup(&shell, flag(rest, "--software")?),
         "help" | "--help" | "-h" => {
             print!("{USAGE}");

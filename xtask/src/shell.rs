@@ -7,6 +7,8 @@ use std::{
     process::{Command, Stdio},
 };
 
+use crate::json::Value;
+
 /// Why the program ends early, and with which exit code.
 #[derive(Debug)]
 pub struct Stop {
@@ -68,8 +70,14 @@ impl Shell {
 
     /// Prints the command and runs it with this terminal; the exit code, or `None` when it could not start or was killed.
     pub fn show<S: AsRef<OsStr>>(&self, words: &[S]) -> Option<i32> {
-        print_command(words);
-        match self.command(words).status() {
+        self.show_with(&[], words)
+    }
+
+    /// The same with variables of the environment.
+    pub fn show_with<S: AsRef<OsStr>>(&self, variables: &[(&str, &str)], words: &[S]) -> Option<i32> {
+        let assignments = variables.iter().map(|(name, value)| format!("{name}={value}"));
+        print_command(&assignments.chain(words.iter().map(|w| w.as_ref().to_string_lossy().into_owned())).collect::<Vec<_>>());
+        match self.command(words).envs(variables.iter().copied()).status() {
             Ok(status) => status.code(),
             Err(error) => {
                 eprintln!("{}: {error}", words[0].as_ref().to_string_lossy());
@@ -117,10 +125,13 @@ impl Shell {
             .quiet(&["cargo", "metadata", "--no-deps", "--format-version", "1"])
             .filter(|f| f.success)
             .ok_or_else(|| Stop::failed("`cargo metadata` failed"))?;
-        let target =
-            json_string(&metadata.stdout, "target_directory").ok_or_else(|| Stop::failed("`cargo metadata` names no target directory"))?;
+        let metadata = Value::parse(&metadata.stdout);
+        let target = metadata
+            .as_ref()
+            .and_then(|v| v.find_text("target_directory"))
+            .ok_or_else(|| Stop::failed("`cargo metadata` names no target directory"))?;
         let name = format!("manylight{}", std::env::consts::EXE_SUFFIX);
-        Ok(Path::new(&target).join(profile).join(name).to_string_lossy().into_owned())
+        Ok(Path::new(target).join(profile).join(name).to_string_lossy().into_owned())
     }
 }
 
@@ -148,24 +159,6 @@ fn pass_on(from: impl Read, mut to: impl Write) -> String {
     all
 }
 
-/// The first string value of a key in a JSON text. Enough for the few flat values read here; escapes other than `\\`, `\"` and `\/` are kept.
-pub fn json_string(text: &str, key: &str) -> Option<String> {
-    let after = text.split_once(&format!("\"{key}\""))?.1;
-    let value = after.trim_start().strip_prefix(':')?.trim_start().strip_prefix('"')?;
-    let mut result = String::new();
-    let mut letters = value.chars();
-    loop {
-        match letters.next()? {
-            '"' => return Some(result),
-            '\\' => match letters.next()? {
-                escaped @ ('\\' | '"' | '/') => result.push(escaped),
-                other => result.extend(['\\', other]),
-            },
-            letter => result.push(letter),
-        }
-    }
-}
-
 /// Text without terminal colours.
 pub fn plain(text: &str) -> String {
     let mut result = String::with_capacity(text.len());
@@ -183,14 +176,6 @@ pub fn plain(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_json_string_is_found_and_unescaped() {
-        let text = r#"{"packages": [], "target_directory" : "C:\\work\/target", "x": 1}"#;
-        assert_eq!(json_string(text, "target_directory").as_deref(), Some("C:\\work/target"));
-        assert_eq!(json_string(text, "absent"), None);
-        assert_eq!(json_string(r#"{"cut": "off"#, "cut"), None);
-    }
 
     #[test]
     fn colours_are_removed() {

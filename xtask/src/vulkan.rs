@@ -8,7 +8,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::shell::{Shell, json_string};
+use crate::{json::Value, shell::Shell};
 
 /// A driver manifest.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -75,7 +75,7 @@ impl Found {
         let drivers = manifests()
             .into_iter()
             .filter_map(|manifest| {
-                let library = json_string(&std::fs::read_to_string(&manifest).ok()?, "library_path")?;
+                let library = Value::parse(&std::fs::read_to_string(&manifest).ok()?)?.find_text("library_path")?.to_owned();
                 let present = libraries.has(&library, manifest.parent().unwrap_or(Path::new(".")));
                 Some(Driver { manifest, library, present })
             })
