@@ -400,7 +400,7 @@ fn every_combination_of_options_renders_finite_numbers_or_is_refused_with_a_reas
         let seconds = start.elapsed().as_secs_f64();
         println!("{path}: {planned} planned, {refused} refused, {rendered} rendered, {without} refused for their numbers, {seconds:.1} s");
         record.push(serde_json::json!({
-            "pipeline": path, "planned": planned, "refused": refused, "rendered": rendered, "refused_for_numbers": without,
+            "pipeline": path, "planned": planned, "refused": refused, "rendered": rendered, "refused_for_numbers": without, "faults": faults.len(),
         }));
         if !faults.is_empty() {
             all.insert(path, faults);
@@ -408,8 +408,8 @@ fn every_combination_of_options_renders_finite_numbers_or_is_refused_with_a_reas
     }
     let told: Vec<String> =
         all.iter().flat_map(|(path, faults)| faults.iter().take(MOST_TOLD).map(move |fault| format!("{path} {fault}"))).collect();
-    assert!(told.is_empty(), "{}", told.join("\n"));
     records::write("combinations", &record);
+    assert!(told.is_empty(), "{}", told.join("\n"));
 }
 
 /// The scan sees what it is there for: one texel of one node that divides by zero, or takes away light that is not there.

@@ -135,20 +135,22 @@ fn summary(
     }
     let _ = writeln!(
         text,
-        "| pipelines on hard scenes | {} pipelines, up to {} scenes, {} renders | bad numbers: 0 |",
+        "| pipelines on hard scenes | {} pipelines, up to {} scenes, {} renders | numbers that are NaN, infinite or below zero, and other faults: {} |",
         scenes.len(),
         largest(scenes, &|row| number(row, "scenes")),
-        sum(scenes, "renders")
+        sum(scenes, "renders"),
+        sum(scenes, "faults")
     );
     let _ =
         writeln!(text, "| the same scene a thousandth or ten thousand times as large | | difference: at most {} |", percent(worst(false)));
     let _ = writeln!(text, "| the same scene 10,000 units away | | difference: at most {} |", percent(worst(true)));
     let _ = writeln!(
         text,
-        "| combinations of options | {} planned, {} refused with a reason, {} renders | bad numbers: 0 |",
+        "| combinations of options | {} planned, {} refused with a reason, {} renders | numbers that are NaN, infinite or below zero, and other faults: {} |",
         grouped(sum(combinations, "planned")),
         grouped(sum(combinations, "refused")),
-        grouped(sum(combinations, "rendered"))
+        grouped(sum(combinations, "rendered")),
+        sum(combinations, "faults")
     );
     let _ = writeln!(
         text,
@@ -193,18 +195,18 @@ fn functions_table(rows: &[Value]) -> String {
 }
 
 fn scenes_table(rows: &[Value]) -> String {
-    let mut text = String::from(
-        "| pipeline | scenes | renders | refused | bad numbers | other size | moved by 10,000 |\n|---|---|---|---|---|---|---|\n",
-    );
+    let mut text =
+        String::from("| pipeline | scenes | renders | refused | faults | other size | moved by 10,000 |\n|---|---|---|---|---|---|---|\n");
     for row in rows {
         let shown = |moved: bool| difference(row, |case| is_moved(case) == moved).map_or("–".to_owned(), percent);
         let _ = writeln!(
             text,
-            "| `{}` | {} | {} | {} | 0 | {} | {} |",
+            "| `{}` | {} | {} | {} | {} | {} | {} |",
             pipeline(row),
             number(row, "scenes"),
             number(row, "renders"),
             number(row, "refused"),
+            number(row, "faults"),
             shown(false),
             shown(true)
         );
@@ -213,12 +215,11 @@ fn scenes_table(rows: &[Value]) -> String {
 }
 
 fn combinations_table(rows: &[Value]) -> String {
-    let mut text =
-        String::from("| pipeline | planned | refused | renders | refused for a number | bad numbers |\n|---|---|---|---|---|---|\n");
+    let mut text = String::from("| pipeline | planned | refused | renders | refused for a number | faults |\n|---|---|---|---|---|---|\n");
     for row in rows {
-        let [planned, refused, rendered, without] =
-            ["planned", "refused", "rendered", "refused_for_numbers"].map(|key| grouped(number(row, key)));
-        let _ = writeln!(text, "| `{}` | {planned} | {refused} | {rendered} | {without} | 0 |", pipeline(row));
+        let [planned, refused, rendered, without, faults] =
+            ["planned", "refused", "rendered", "refused_for_numbers", "faults"].map(|key| grouped(number(row, key)));
+        let _ = writeln!(text, "| `{}` | {planned} | {refused} | {rendered} | {without} | {faults} |", pipeline(row));
     }
     text
 }
