@@ -13,7 +13,7 @@ pub enum Repeat {
 }
 
 /// A value that can be mixed with another.
-pub trait Interpolate: Clone {
+pub trait Interpolate: Clone + PartialEq {
     /// The value at `fraction` of the way from `self` (0) to `other` (1).
     #[must_use]
     fn interpolate(&self, other: &Self, fraction: f32) -> Self;
@@ -78,6 +78,8 @@ impl<T: Interpolate> Track<T> {
     pub fn at(&self, time: f64) -> T {
         match self.around(time) {
             (before, _, 0.0) => before.clone(),
+            // What rests between two keys must not move by rounding: who looks at it would see a change.
+            (before, after, _) if before == after => before.clone(),
             (before, after, fraction) => before.interpolate(after, fraction),
         }
     }
