@@ -143,7 +143,7 @@ fn tessellation_is_as_its_twin() {
                     &[Object { world_from_object: Mat4::IDENTITY, normal_from_object: Mat4::IDENTITY }],
                 ),
                 Resource::uniform("scene_info", "SceneInfo", &info),
-                Resource::uniform("frame", "Frame", &gpu_data::Frame::default()),
+                Resource::uniform("seed", "Seed", &gpu_data::Seed::default()),
             ]);
             world.add_node("points/dynamic");
             world.add_picture();
