@@ -137,7 +137,7 @@ impl Skipper {
             let same = !is_first && node.inputs.iter().map(version).eq(node.ran_with.iter().copied());
             // Without inputs there is nothing that could change.
             let same = same || (node.inputs.is_empty() && node.ran_with == [0]);
-            node.runs = !settled && !(*on && same);
+            node.runs = !(settled || *on && same);
             node.copies = false;
             if node.runs {
                 node.ran_with.clear();
