@@ -6,23 +6,10 @@ use manylight_gpu::FrameTimings;
 use manylight_passes::{Renderer, Settings};
 
 use crate::{
-    matrix::documents_of_all_pipelines,
+    matrix::{Chance, documents_of_all_pipelines},
     renders::{Job, read},
     support::{copy_of_library, root},
 };
-
-/// A repeatable source of chance (splitmix64).
-struct Chance(u64);
-
-impl Chance {
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) % end
-    }
-}
 
 /// The scene, whose camera, light and block move or stand still in turn: each for two seconds of eight.
 const SCENE: &str = r#"Scene(
@@ -107,7 +94,7 @@ fn skipping_changes_no_bit() {
             time += 0.1 * chance.below(4) as f64;
         }
         if chance.below(9) == 0 {
-            let change = &CHANGES[chance.below(CHANGES.len() as u64) as usize];
+            let change = &CHANGES[chance.below(CHANGES.len())];
             if let Change::Shader(file, from, to) = change {
                 let path = project.path().join(file);
                 let text = fs::read_to_string(&path).expect("readable");

@@ -201,6 +201,8 @@ fn long_meshes_are_read_in_proportion_to_their_length() {
         assert_eq!(scene.triangle_count(), 2 * side * side);
         start.elapsed()
     };
-    let (short, long) = (time(70).max(Duration::from_millis(2)), time(220));
+    // The best of some tries: other work on the machine only makes them longer.
+    let best = |side: usize| (0..5).map(|_| time(side)).min().expect("tries");
+    let (short, long) = (best(70).max(Duration::from_millis(2)), best(220));
     assert!(long < 60 * short, "10⁴ lines take {short:?}, 10⁵ lines {long:?}");
 }
