@@ -22,7 +22,7 @@ use manylight_scene::Scene;
 use crate::{
     records,
     renders::{Job, gpu, lights_to_show},
-    support::{project_with, root},
+    support::{Random, project_with, root},
 };
 
 const SIZE: (u32, u32) = (24, 16);
@@ -51,20 +51,6 @@ pub struct Factor {
 
 /// An index of a value by factor.
 type Row = Vec<usize>;
-
-/// A repeatable source of chance (splitmix64).
-pub struct Chance(pub u64);
-
-impl Chance {
-    /// Less than `end`.
-    pub fn below(&mut self, end: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % end.max(1) as u64) as usize
-    }
-}
 
 /// A pipeline with the scenes that it is tried on.
 pub struct Subject<'a> {
@@ -129,7 +115,7 @@ impl<'a> Subject<'a> {
     }
 
     /// Plans the product of all options on all scenes, or `most` of it; returns the rows that all scenes accept, and how many were refused.
-    fn plan_all(&self, most: usize, chance: &mut Chance, faults: &mut Vec<String>) -> (Vec<Row>, usize) {
+    fn plan_all(&self, most: usize, chance: &mut Random, faults: &mut Vec<String>) -> (Vec<Row>, usize) {
         let product = self.options.iter().try_fold(1_usize, |n, factor| n.checked_mul(factor.values.len()));
         let row = |mut index: usize| -> Row {
             let digit = |factor: &Factor| {
@@ -188,7 +174,7 @@ impl<'a> Subject<'a> {
     }
 
     /// Rows over options and numbers in which every two values meet that meet in an accepted row. The first one is the pipeline as it is.
-    fn pairs(&self, accepted: &[Row], chance: &mut Chance) -> Vec<Row> {
+    fn pairs(&self, accepted: &[Row], chance: &mut Random) -> Vec<Row> {
         let factors = self.factors();
         let options = self.options.len();
         let pairs_of = |row: &Row| -> BTreeSet<[(usize, usize); 2]> {
@@ -211,7 +197,7 @@ impl<'a> Subject<'a> {
         while let Some(&wanted) = open.first() {
             let fits = |row: &&Row| wanted.iter().all(|&(i, value)| i >= options || row[i] == value);
             let fitting: Vec<&Row> = accepted.iter().filter(fits).collect();
-            let candidate = |chance: &mut Chance| -> Row {
+            let candidate = |chance: &mut Random| -> Row {
                 let mut row = fitting[chance.below(fitting.len())].clone();
                 row.extend(factors[options..].iter().map(|factor| chance.below(factor.values.len())));
                 wanted.iter().for_each(|&(i, value)| row[i] = value);
@@ -371,7 +357,7 @@ struct Tried {
 
 /// Plans and renders a pipeline in all ways; returns the counts, and the faults.
 fn try_all(subject: &Subject<'_>, most: usize, seed: u64) -> (Tried, Vec<String>) {
-    let (mut chance, mut faults) = (Chance(seed), Vec::new());
+    let (mut chance, mut faults) = (Random(seed), Vec::new());
     let (accepted, refused) = subject.plan_all(most, &mut chance, &mut faults);
     let rows = if faults.is_empty() { subject.pairs(&accepted, &mut chance) } else { Vec::new() };
     let mut tried = Tried { planned: accepted.len(), refused, ..Tried::default() };

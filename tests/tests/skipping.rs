@@ -6,9 +6,9 @@ use manylight_gpu::FrameTimings;
 use manylight_passes::{Renderer, Settings};
 
 use crate::{
-    matrix::{Chance, documents_of_all_pipelines},
+    matrix::documents_of_all_pipelines,
     renders::{Job, read},
-    support::{copy_of_library, root},
+    support::{Random, copy_of_library, root},
 };
 
 /// The scene, whose camera, light and block move or stand still in turn: each for two seconds of eight.
@@ -87,7 +87,7 @@ fn skipping_changes_no_bit() {
     fs::write(&scene, SCENE).expect("writable");
     let mut all = renderer(project.path(), &scene, false);
     let mut skipping = renderer(project.path(), &scene, true);
-    let (mut chance, mut time, mut skipped, mut applied) = (Chance(3), 0.0, 0, 0);
+    let (mut chance, mut time, mut skipped, mut applied) = (Random(3), 0.0, 0, 0);
     for frame in 0..FRAMES {
         // Time stands still for a while now and then.
         if chance.below(3) > 0 {

@@ -5,7 +5,10 @@ use std::{f64::consts::PI, fmt::Write, fs, path::PathBuf};
 
 use glam::DVec3;
 
-use crate::blocks::{Block, blocks};
+use crate::{
+    blocks::{Block, blocks},
+    support::Random,
+};
 
 pub struct Triangle {
     corners: [DVec3; 3],
@@ -113,15 +116,6 @@ struct Hit {
 /// Rays start this far off a surface, in the scene's units (about 1 across).
 const OFFSET: f64 = 1e-6;
 
-/// SplitMix64 (Steele et al. 2014), as a number in [0, 1).
-fn random(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 * 2.0_f64.powi(-53)
-}
-
 impl Twin {
     /// Writes the scene into a folder and returns its path.
     pub fn write(&self, folder: &tempfile::TempDir) -> PathBuf {
@@ -184,8 +178,8 @@ impl Twin {
     }
 
     /// Radiance that comes over one more surface, by a single path.
-    fn one_bounce(&self, hit: &Hit, state: &mut u64) -> DVec3 {
-        let (r2, angle) = (random(state), 2.0 * PI * random(state));
+    fn one_bounce(&self, hit: &Hit, state: &mut Random) -> DVec3 {
+        let (r2, angle) = (state.unit(), 2.0 * PI * state.unit());
         let (side, across) = hit.normal.any_orthonormal_pair();
         let direction = r2.sqrt() * (angle.cos() * side + angle.sin() * across) + (1.0 - r2).sqrt() * hit.normal;
         if direction.dot(hit.geometric) <= 0.0 {
@@ -197,13 +191,13 @@ impl Twin {
 
     /// Direct light and one bounce of a square picture, from this many paths a pixel.
     pub fn render(&self, size: u32, paths: u32) -> [Vec<Block>; 2] {
-        let mut state = 1;
+        let mut state = Random(1);
         let mut pixels = Vec::new();
         for y in 0..size {
             for x in 0..size {
                 let mut sums = [[DVec3::ZERO; 2]; 2];
                 for _ in 0..paths {
-                    let (u, v) = (f64::from(x) + random(&mut state), f64::from(y) + random(&mut state));
+                    let (u, v) = (f64::from(x) + state.unit(), f64::from(y) + state.unit());
                     let direction = self.camera.ray(u / f64::from(size), v / f64::from(size));
                     let Some(hit) = self.hit(self.camera.origin, direction, f64::INFINITY) else { continue };
                     for (sum, value) in sums.iter_mut().zip([self.direct(&hit), self.one_bounce(&hit, &mut state)]) {

@@ -8,8 +8,8 @@ use manylight::passes::{
 };
 use sha2::{Digest, Sha256};
 
-use super::mutate::{Random, fuzz, ron};
-use crate::support::root;
+use super::mutate::{fuzz, ron};
+use crate::support::{Random, root};
 
 /// Before the header: eight bytes, version and length.
 const FIXED: usize = 16;

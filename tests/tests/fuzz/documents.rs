@@ -27,9 +27,9 @@ use manylight::{
 
 use super::{
     check_faults,
-    mutate::{Random, fuzz, ron},
+    mutate::{fuzz, ron},
 };
-use crate::support::root;
+use crate::support::{Random, root};
 
 /// Much longer than the slowest of tens of thousands of cases, on a machine that does other things as well.
 const BOUND: Duration = Duration::from_secs(20);

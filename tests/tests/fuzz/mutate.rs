@@ -11,6 +11,8 @@ use std::{
     time::Duration,
 };
 
+use crate::support::Random;
+
 fn number(variable: &str) -> Option<u64> {
     env::var(variable).ok()?.parse().ok()
 }
@@ -31,7 +33,7 @@ pub fn fuzz(name: &'static str, count: u64, bound: Duration, mut case: impl FnMu
         for index in cases {
             // Nobody listens any more when an earlier case took too long.
             let _ = tell.send(index);
-            let caught = catch_unwind(AssertUnwindSafe(|| case(&mut Random::new(index))));
+            let caught = catch_unwind(AssertUnwindSafe(|| case(&mut Random::spread(index))));
             if let Err(panic) = caught {
                 eprintln!("{name}: the case MANYLIGHT_FUZZ_CASE={index} failed");
                 resume_unwind(panic);
@@ -48,33 +50,6 @@ pub fn fuzz(name: &'static str, count: u64, bound: Duration, mut case: impl FnMu
     }
     if let Err(panic) = worker.join() {
         resume_unwind(panic);
-    }
-}
-
-/// Numbers that look random and are the same on each run (splitmix64).
-#[derive(Debug, Clone)]
-pub struct Random(u64);
-
-impl Random {
-    pub fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
-    }
-
-    pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// A number below `end`, which is above 0.
-    pub fn below(&mut self, end: usize) -> usize {
-        (self.next() % end as u64) as usize
-    }
-
-    pub fn of<'a, T>(&mut self, all: &'a [T]) -> &'a T {
-        &all[self.below(all.len())]
     }
 }
 
@@ -537,7 +512,7 @@ mod tests {
     #[test]
     fn equal_seeds_give_equal_texts_and_most_differ_from_the_good_one() {
         let text = "Pipeline(doc: \"a\", params: {\"n\": Int(min: 0, max: 9, default: 1, doc: \"b\")}, presents: \"p\")";
-        let of = |seed| ron(text, text, &mut Random::new(seed));
+        let of = |seed| ron(text, text, &mut Random::spread(seed));
         let changed = (0..1000).filter(|seed| of(*seed) != text).count();
         assert!((0..50).all(|seed| of(seed) == of(seed)) && changed > 900, "{changed}");
     }

@@ -4,7 +4,8 @@ use std::{fs, time::Duration};
 
 use manylight::files::{Picture, read_picture, write_exr, write_png};
 
-use super::mutate::{Random, fuzz};
+use super::mutate::fuzz;
+use crate::support::Random;
 
 #[test]
 fn damaged_pictures_are_read_or_refused_with_a_reason() {

@@ -19,9 +19,9 @@ use manylight::{
 
 use super::{
     check_faults,
-    mutate::{Random, fuzz, wgsl},
+    mutate::{fuzz, wgsl},
 };
-use crate::support::{copy_of_library, root};
+use crate::support::{Random, copy_of_library, root};
 
 /// Compiling a pipeline takes seconds on a machine that does other things as well.
 const BOUND: Duration = Duration::from_secs(120);
