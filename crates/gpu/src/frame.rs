@@ -161,12 +161,7 @@ impl Frame {
         let start = Instant::now();
         self.follow_externals(gpu, externals)?;
         self.run_hosts(gpu, externals, data)?;
-        let host_bytes = &self.host_bytes;
-        let stamp_of_host = |ix| host_bytes.get(&ix).map_or(0, |bytes| bytes.stamp);
-        self.skipper.decide((self.index & 1) as usize, |name| externals.stamp(name), stamp_of_host);
-        for ix in 0..self.nodes.len() {
-            self.timer.set_ran(ix, self.skipper.runs(ix));
-        }
+        self.skip_unchanged(externals);
         if self.serial {
             self.submit_serially(gpu);
         } else {
@@ -182,6 +177,17 @@ impl Frame {
             return Err(RunError::Gpu(gpu.take_errors().join("; ")));
         }
         Ok(())
+    }
+
+    /// Decides which nodes run in this frame.
+    fn skip_unchanged(&mut self, externals: &Externals) {
+        let parity = self.parity();
+        let host_bytes = &self.host_bytes;
+        let stamp_of_host = |ix| host_bytes.get(&ix).map_or(0, |bytes| bytes.stamp);
+        self.skipper.decide(parity, |name| externals.stamp(name), stamp_of_host);
+        for ix in 0..self.nodes.len() {
+            self.timer.set_ran(ix, self.skipper.runs(ix));
+        }
     }
 
     /// Whether each node is submitted on its own and waited for, so that its GPU time is the wall-clock time of that.
@@ -203,6 +209,10 @@ impl Frame {
             gpu.queue().submit([encoder.finish()]);
         }
         for ix in 0..self.nodes.len() {
+            let runs = self.skipper.runs(ix);
+            if !runs && !self.nodes[ix].passes.is_empty() {
+                self.timer.set_serial(ix, 0);
+            }
             if !self.has_gpu_work(ix) {
                 continue;
             }
@@ -214,9 +224,11 @@ impl Frame {
             let start = Instant::now();
             gpu.queue().submit([commands]);
             gpu.wait();
-            let took = if self.skipper.runs(ix) { nanoseconds(start) } else { 0 };
+            let took = nanoseconds(start);
             gpu_ns += took;
-            self.timer.set_serial(ix, took);
+            if runs {
+                self.timer.set_serial(ix, took);
+            }
         }
         self.timer.ran_serially(self.index, cpu_ns, gpu_ns);
     }
@@ -234,9 +246,11 @@ impl Frame {
         self.skipper.forget();
     }
 
-    /// Whether a node has passes, or wrote on the host what is looked at on the GPU.
+    /// Whether a node has passes to run in this frame, wrote on the host what is looked at on the GPU, or left a history to be copied.
     fn has_gpu_work(&self, ix: usize) -> bool {
-        !self.nodes[ix].passes.is_empty() || self.numbers.as_ref().is_some_and(|numbers| numbers.looks_at(ix))
+        let is_looked_at = || self.numbers.as_ref().is_some_and(|numbers| numbers.looks_at(ix));
+        let works = !self.nodes[ix].passes.is_empty() || is_looked_at();
+        (self.skipper.runs(ix) && works) || !self.skipper.copies(ix).is_empty()
     }
 
     /// Records all nodes.
@@ -250,9 +264,6 @@ impl Frame {
     }
 
     fn encode_node(&mut self, encoder: &mut wgpu::CommandEncoder, ix: usize, parity: usize) {
-        if !self.has_gpu_work(ix) {
-            return;
-        }
         let Self { plan, nodes, timer, poison, numbers, skipper, resources, .. } = self;
         let (node, planned) = (&nodes[ix], &plan.nodes[ix]);
         for &history in skipper.copies(ix) {
@@ -261,35 +272,18 @@ impl Frame {
             }
         }
         if !skipper.runs(ix) {
-            if node.host.is_none() {
-                timer.set_cpu(ix, 0);
-            }
             return;
         }
-        let start = Instant::now();
-        let id = planned.id.as_str();
-        let _span = tracing::info_span!("node", node = id, stage = planned.stage.as_str()).entered();
-        if let Some(poison) = poison {
-            for fill in &node.poisons {
-                poison.fill(encoder, fill);
-            }
-        }
-        let span = timer.span(ix);
-        let last = node.passes.len().saturating_sub(1);
-        for (i, pass) in node.passes.iter().enumerate() {
-            let stamps = span.filter(|_| i == 0 || i == last);
-            let stamps = stamps.map(|(set, begin, end)| (set, (i == 0).then_some(begin), (i == last).then_some(end)));
-            match pass {
-                Pass::Compute(steps) => compute(encoder, id, steps, parity, stamps),
-                Pass::Draw(step) => draw(encoder, id, step, parity, stamps),
-            }
+        if !node.passes.is_empty() {
+            let start = Instant::now();
+            encode_passes(encoder, node, planned, poison.as_ref(), timer.span(ix), parity);
+            timer.set_cpu(ix, nanoseconds(start));
         }
         if let Some(numbers) = numbers
             && numbers.looks_at(ix)
         {
             numbers.scan(encoder, ix, parity);
         }
-        timer.set_cpu(ix, nanoseconds(start));
     }
 
     /// Binds externals whose memory was replaced since the bind groups were made.
@@ -361,6 +355,33 @@ impl Frame {
             timer.set_cpu(ix, nanoseconds(start));
         }
         Ok(())
+    }
+}
+
+/// Records the passes of a node, timed by two queries where there are any.
+fn encode_passes(
+    encoder: &mut wgpu::CommandEncoder,
+    node: &Node,
+    planned: &PlanNode,
+    poison: Option<&Poison>,
+    span: Option<(&wgpu::QuerySet, u32, u32)>,
+    parity: usize,
+) {
+    let id = planned.id.as_str();
+    let _span = tracing::info_span!("node", node = id, stage = planned.stage.as_str()).entered();
+    if let Some(poison) = poison {
+        for fill in &node.poisons {
+            poison.fill(encoder, fill);
+        }
+    }
+    let last = node.passes.len() - 1;
+    for (i, pass) in node.passes.iter().enumerate() {
+        let stamps = span.filter(|_| i == 0 || i == last);
+        let stamps = stamps.map(|(set, begin, end)| (set, (i == 0).then_some(begin), (i == last).then_some(end)));
+        match pass {
+            Pass::Compute(steps) => compute(encoder, id, steps, parity, stamps),
+            Pass::Draw(step) => draw(encoder, id, step, parity, stamps),
+        }
     }
 }
 

@@ -1,8 +1,7 @@
 //! Sizes compared with what the device allows, before anything is allocated.
 
 use manylight_graph::{
-    plan::{Lifetime, Plan, PlanNode, PlanResource, PlanStep, Target},
-    registry::Direction,
+    plan::{Lifetime, Plan, PlanNode, PlanResource, PlanStep},
     value::ResourceDesc,
 };
 
@@ -69,7 +68,7 @@ fn remedy<'a>(plan: &Plan, resources: impl IntoIterator<Item = &'a PlanResource>
     }
     names.sort_unstable();
     names.dedup();
-    let value = |name: &str| plan.params.iter().find(|(known, _)| known == name).map(|(_, value)| format!(" (now {value})"));
+    let value = |name: &str| plan.param(name).map(|value| format!(" (now {value})"));
     let mut shown: Vec<String> = names.into_iter().map(|name| format!("`{name}`{}", value(name).unwrap_or_default())).collect();
     if has_fixed {
         shown.push("the size of the picture".to_owned());
@@ -79,12 +78,7 @@ fn remedy<'a>(plan: &Plan, resources: impl IntoIterator<Item = &'a PlanResource>
 
 /// What to lower for a node: what decides the sizes of what it writes.
 fn remedy_of_node(plan: &Plan, node: &PlanNode) -> String {
-    let written = node.bindings.iter().filter(|(port, _)| node.decl.ports.get(port).is_some_and(|p| p.direction == Direction::Output));
-    let resources = written.filter_map(|(_, target)| match target {
-        Target::Resource(ix) => plan.resources.get(*ix),
-        _ => None,
-    });
-    remedy(plan, resources)
+    remedy(plan, node.outputs().filter_map(|ix| plan.resources.get(ix)))
 }
 
 /// Compares a node's dispatches and render targets with the limits.

@@ -5,7 +5,6 @@ use std::{collections::BTreeMap, fmt};
 
 use manylight_graph::{
     plan::{Plan, PlanNode, Target},
-    registry::Port,
     shader::{Layout, MemberKind, Scalar},
     value::{Format, ResourceDesc},
 };
@@ -22,8 +21,9 @@ use crate::{
 
 const SHADER: &str = include_str!("numbers.wgsl");
 
-/// Bytes of a scan's settings, padded to where the next uniform may start.
-const SETTINGS_STRIDE: usize = 256;
+/// Words of a scan's settings, and from one to the next: where a uniform may start.
+const SETTINGS_WORDS: usize = 8;
+const SETTINGS_STRIDE: usize = 64;
 /// Numbers that a scan finds: counts by kind, then first places by kind.
 const FINDING_WORDS: usize = 8;
 /// Workgroups of a scan of a buffer; each takes many words.
@@ -108,9 +108,17 @@ pub(crate) struct Numbers {
 }
 
 /// One level and layer of a texture, or a buffer, that a node writes.
+struct Written {
+    resource: usize,
+    /// What the port promises: `at_least`, `at_most`.
+    bounds: [Option<f64>; 2],
+    part: Part,
+}
+
+/// How it is looked at.
 struct Scan {
     resource: usize,
-    port: Port,
+    bounds: [Option<f64>; 2],
     part: Part,
     /// By parity of the frame.
     bind: [wgpu::BindGroup; 2],
@@ -123,6 +131,7 @@ enum Part {
         level: u32,
         layer: u32,
         width: u32,
+        height: u32,
         channels: u32,
     },
     /// Fields of an element that hold floats, by word; words an element.
@@ -136,83 +145,63 @@ enum Part {
 impl Numbers {
     /// Prepares the scans of everything that the nodes of a plan write.
     pub(crate) fn new(gpu: &Gpu, plan: &Plan, resources: &[Resource]) -> Result<Self, Fault> {
-        let failed = |message: String| Fault::Resource { resource: "the scan of numbers".to_owned(), message };
-        let parts: Vec<Vec<(usize, Port, Part)>> = plan.nodes.iter().map(|node| parts(plan, node)).collect();
+        use wgpu::BufferUsages as U;
+        let parts: Vec<Vec<Written>> = plan.nodes.iter().map(|node| written(plan, node)).collect();
         let count = parts.iter().map(Vec::len).sum::<usize>();
-        gpu.scoped(|| {
+        let made = gpu.scoped(|| {
             let device = gpu.device();
-            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some("numbers"),
-                source: wgpu::ShaderSource::Wgsl(SHADER.into()),
-            });
-            let pipeline = |entry: &'static str| {
-                device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                    label: Some(entry),
-                    layout: Some(&layout(device, entry)),
-                    module: &module,
-                    entry_point: Some(entry),
-                    compilation_options: Default::default(),
-                    cache: None,
-                })
+            let source = wgpu::ShaderSource::Wgsl(SHADER.into());
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some("numbers"), source });
+            let settings: Vec<u32> = parts.iter().flatten().enumerate().flat_map(|(record, part)| settings_of(part, record)).collect();
+            let settings = buffer(gpu, "scans of numbers", U::UNIFORM, &settings);
+            let nothing = [0, 0, 0, 0, u32::MAX, u32::MAX, u32::MAX, u32::MAX].repeat(count);
+            let mut numbers = Self {
+                texels: pipeline(device, &module, "look_at_texels"),
+                words: pipeline(device, &module, "look_at_words"),
+                findings: buffer(gpu, "numbers found", U::STORAGE | U::COPY_SRC, &nothing),
+                nothing_found: buffer(gpu, "no numbers found", U::COPY_SRC, &nothing),
+                by_node: Vec::new(),
             };
-            let buffer = |label, size: usize, usage| {
-                let size = (size as u64).max(64);
-                device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
-            };
-            use wgpu::BufferUsages as U;
-            let size = count * FINDING_WORDS * 4;
-            let findings = buffer("numbers found", size, U::STORAGE | U::COPY_DST | U::COPY_SRC);
-            let nothing_found = buffer("no numbers found", size, U::COPY_SRC | U::COPY_DST);
-            let empty = [0, 0, 0, 0, u32::MAX, u32::MAX, u32::MAX, u32::MAX];
-            gpu.queue().write_buffer(&nothing_found, 0, &words_to_bytes(&empty.repeat(count)));
-            let settings = buffer("scans of numbers", count * SETTINGS_STRIDE, U::UNIFORM | U::COPY_DST);
-            let (texels, words) = (pipeline("look_at_texels"), pipeline("look_at_words"));
-            let mut record = 0;
-            let mut by_node = Vec::new();
+            let mut record = 0..;
             for parts in parts {
-                let mut scans = Vec::new();
-                for (resource, port, part) in parts {
-                    gpu.queue().write_buffer(&settings, (record * SETTINGS_STRIDE) as u64, &settings_of(&part, &port, record as u32));
-                    let at = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                        buffer: &settings,
-                        offset: (record * SETTINGS_STRIDE) as u64,
-                        size: wgpu::BufferSize::new(32),
-                    });
-                    let masks = part.mask().map(|mask| {
-                        let masks = buffer("words that are floats", mask.len() * 4, U::STORAGE | U::COPY_DST);
-                        gpu.queue().write_buffer(&masks, 0, &words_to_bytes(&mask));
-                        masks
-                    });
-                    let bind = [0, 1].map(|parity| {
-                        let mut entries = vec![
-                            wgpu::BindGroupEntry { binding: 0, resource: at.clone() },
-                            wgpu::BindGroupEntry { binding: 1, resource: findings.as_entire_binding() },
-                        ];
-                        let image;
-                        match (resources[resource].memory(parity), &masks) {
-                            (Some(Memory::Texture(texture)), _) => {
-                                image = view(texture, true, None);
-                                entries.push(wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::TextureView(&image) });
-                            }
-                            (Some(Memory::Buffer(buffer)), Some(masks)) => {
-                                entries.push(wgpu::BindGroupEntry { binding: 3, resource: buffer.as_entire_binding() });
-                                entries.push(wgpu::BindGroupEntry { binding: 4, resource: masks.as_entire_binding() });
-                            }
-                            // What is from outside, no node writes.
-                            _ => {}
-                        }
-                        let pipeline = if masks.is_some() { &words } else { &texels };
-                        let layout = &pipeline.get_bind_group_layout(0);
-                        device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("numbers"), layout, entries: &entries })
-                    });
-                    scans.push(Scan { groups: part.groups(&resources[resource].desc), resource, port, part, bind });
-                    record += 1;
-                }
-                by_node.push(scans);
+                let scans =
+                    parts.into_iter().zip(&mut record).map(|(part, record)| numbers.prepare(gpu, &settings, resources, part, record));
+                let scans = scans.collect();
+                numbers.by_node.push(scans);
             }
-            Self { texels, words, findings, nothing_found, by_node }
-        })
-        .map_err(failed)
+            numbers
+        });
+        made.map_err(|message| Fault::Resource { resource: "the scan of numbers".to_owned(), message })
+    }
+
+    /// The scan of a part, whose settings and findings are those of a record.
+    fn prepare(&self, gpu: &Gpu, settings: &wgpu::Buffer, resources: &[Resource], written: Written, record: u64) -> Scan {
+        let Written { resource, bounds, part } = written;
+        let size = wgpu::BufferSize::new(4 * SETTINGS_WORDS as u64);
+        let own = wgpu::BufferBinding { buffer: settings, offset: 4 * SETTINGS_STRIDE as u64 * record, size };
+        let is_float = part.mask().map(|mask| buffer(gpu, "words that are floats", wgpu::BufferUsages::STORAGE, &mask));
+        let bind = [0, 1].map(|parity| {
+            let image;
+            let (pipeline, seen) = match (resources[resource].memory(parity), &is_float) {
+                (Some(Memory::Buffer(buffer)), Some(is_float)) => {
+                    (&self.words, vec![(3, buffer.as_entire_binding()), (4, is_float.as_entire_binding())])
+                }
+                (Some(Memory::Texture(texture)), _) => {
+                    image = view(texture, true, None);
+                    (&self.texels, vec![(2, wgpu::BindingResource::TextureView(&image))])
+                }
+                // What is from outside, no node writes.
+                _ => (&self.texels, Vec::new()),
+            };
+            let shared = [(0, wgpu::BindingResource::Buffer(own.clone())), (1, self.findings.as_entire_binding())];
+            let all = shared.into_iter().chain(seen).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
+            gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("numbers"),
+                layout: &pipeline.get_bind_group_layout(0),
+                entries: &all.collect::<Vec<_>>(),
+            })
+        });
+        Scan { resource, bounds, groups: part.groups(), part, bind }
     }
 
     /// Forgets what the frame before found.
@@ -246,10 +235,11 @@ impl Numbers {
         for ((node, scan), finding) in scans.zip(words.chunks_exact(FINDING_WORDS)) {
             let (counts, firsts) = finding.split_at(KINDS.len());
             for (what, (count, first)) in KINDS.into_iter().zip(counts.iter().zip(firsts)).filter(|(_, (count, _))| **count > 0) {
+                let [at_least, at_most] = scan.bounds;
                 let bound = match what {
-                    BadNumber::TooSmall => scan.port.at_least,
-                    BadNumber::TooLarge => scan.port.at_most,
-                    _ => None,
+                    BadNumber::TooSmall => at_least,
+                    BadNumber::TooLarge => at_most,
+                    BadNumber::NotANumber | BadNumber::Infinite => None,
                 };
                 all.push(BadNumbers {
                     node: node.id.clone(),
@@ -286,36 +276,58 @@ fn layout(device: &wgpu::Device, entry: &str) -> wgpu::PipelineLayout {
     })
 }
 
-fn words_to_bytes(words: &[u32]) -> Vec<u8> {
-    words.iter().flat_map(|w| w.to_le_bytes()).collect()
+fn pipeline(device: &wgpu::Device, module: &wgpu::ShaderModule, entry: &str) -> wgpu::ComputePipeline {
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(entry),
+        layout: Some(&layout(device, entry)),
+        module,
+        entry_point: Some(entry),
+        compilation_options: Default::default(),
+        cache: None,
+    })
 }
 
-fn settings_of(part: &Part, port: &Port, record: u32) -> Vec<u8> {
-    let [level, layer, numbers, count] = match *part {
+/// A buffer with these contents; of at least one finding, as bindings must not be empty.
+fn buffer(gpu: &Gpu, label: &str, usage: wgpu::BufferUsages, contents: &[u32]) -> wgpu::Buffer {
+    let size = (4 * contents.len().max(FINDING_WORDS)) as u64;
+    let usage = usage | wgpu::BufferUsages::COPY_DST;
+    let buffer = gpu.device().create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
+    gpu.queue().write_buffer(&buffer, 0, bytemuck::cast_slice(contents));
+    buffer
+}
+
+/// The structure `Scan` of `numbers.wgsl`, padded to where the next one may start.
+fn settings_of(written: &Written, record: usize) -> [u32; SETTINGS_STRIDE] {
+    let [level, layer, numbers, count] = match written.part {
         Part::Level { level, layer, channels, .. } => [level, layer, channels, 0],
         Part::Buffer { stride, count, .. } => [0, 0, stride, count],
     };
-    let bounds = u32::from(port.at_least.is_some()) | u32::from(port.at_most.is_some()) << 1;
+    let [at_least, at_most] = written.bounds;
+    let bounds = u32::from(at_least.is_some()) | u32::from(at_most.is_some()) << 1;
     let bits = |bound: Option<f64>| (bound.unwrap_or(0.0) as f32).to_bits();
-    words_to_bytes(&[level, layer, numbers, count, bits(port.at_least), bits(port.at_most), bounds, record])
+    let own: [u32; SETTINGS_WORDS] = [level, layer, numbers, count, bits(at_least), bits(at_most), bounds, record as u32];
+    let mut padded = [0; SETTINGS_STRIDE];
+    padded[..SETTINGS_WORDS].copy_from_slice(&own);
+    padded
 }
 
-/// What a node writes that holds floats: index of the resource, port, and what of it is looked at in one go.
-fn parts(plan: &Plan, node: &PlanNode) -> Vec<(usize, Port, Part)> {
+/// What a node writes that holds floats.
+fn written(plan: &Plan, node: &PlanNode) -> Vec<Written> {
     let mut all = Vec::new();
     for (name, target) in &node.bindings {
         let (Target::Resource(ix), true, Some(port)) = (*target, is_output(node, name), node.decl.ports.get(name)) else { continue };
         let resource = &plan.resources[ix];
+        let of = |part| Written { resource: ix, bounds: [port.at_least, port.at_most], part };
         match &resource.desc {
-            ResourceDesc::Texture { format, width, layers, mips, .. } => {
+            ResourceDesc::Texture { format, width, height, layers, mips, .. } => {
                 // Whole numbers are no floats; depth that was drawn lies between 0 and 1.
                 if matches!(format, Format::R32Uint | Format::Rg32Uint | Format::Rgba32Uint | Format::Depth32Float) {
                     continue;
                 }
                 let levels = (0..*mips).flat_map(|level| (0..*layers).map(move |layer| (level, layer)));
                 all.extend(levels.map(|(level, layer)| {
-                    let width = mip_size(*width, 1, level).0;
-                    (ix, port.clone(), Part::Level { level, layer, width, channels: channels(*format) })
+                    let (width, height) = mip_size(*width, *height, level);
+                    of(Part::Level { level, layer, width, height, channels: channels(*format) })
                 }));
             }
             ResourceDesc::Buffer { element, stride, count } => {
@@ -327,7 +339,7 @@ fn parts(plan: &Plan, node: &PlanNode) -> Vec<(usize, Port, Part)> {
                 let stride = (*stride / 4).max(1);
                 if !fields.is_empty() {
                     let count = u32::try_from(u64::from(stride) * count).unwrap_or(u32::MAX);
-                    all.push((ix, port.clone(), Part::Buffer { fields, stride, count }));
+                    all.push(of(Part::Buffer { fields, stride, count }));
                 }
             }
             ResourceDesc::Uniform { .. } => {}
@@ -376,20 +388,16 @@ impl Part {
         }
     }
 
-    fn groups(&self, desc: &ResourceDesc) -> [u32; 2] {
-        match (self, desc) {
-            (Self::Level { level, .. }, ResourceDesc::Texture { width, height, .. }) => {
-                let (width, height) = mip_size(*width, *height, *level);
-                [width.div_ceil(8), height.div_ceil(8)]
-            }
-            (Self::Buffer { count, .. }, _) => [count.div_ceil(64).clamp(1, MOST_GROUPS), 1],
-            (Self::Level { .. }, _) => [0, 0],
+    fn groups(&self) -> [u32; 2] {
+        match self {
+            Self::Level { width, height, .. } => [width.div_ceil(8), height.div_ceil(8)],
+            Self::Buffer { count, .. } => [count.div_ceil(64).clamp(1, MOST_GROUPS), 1],
         }
     }
 
     fn place(&self, number: u32) -> NumberPlace {
         match self {
-            Self::Level { level, layer, width, channels } => {
+            Self::Level { level, layer, width, channels, .. } => {
                 let texel = number / channels;
                 NumberPlace::Texel { x: texel % width, y: texel / width, level: *level, layer: *layer, channel: number % channels }
             }

@@ -5,10 +5,9 @@
 //! it wrote itself in the frame before, has other inputs in every frame: it always runs, or declares that it `settles`: then it stops some frames after
 //! the last change of anything else. That is part of what the node means, and holds whether unchanged nodes are skipped or not.
 
-use manylight_graph::{
-    plan::{Lifetime, Plan, ResourceIx, Target},
-    registry::Direction,
-};
+use manylight_graph::plan::{Lifetime, Plan, ResourceIx, Target};
+
+use crate::uses::is_output;
 
 /// The external that is another one in every frame.
 const FRAME: &str = "frame";
@@ -52,8 +51,7 @@ impl Skipper {
         let transients = plan.resources.iter().filter(|r| matches!(r.lifetime, Lifetime::Transient { .. })).count();
         let on = skip_unchanged && plan.slots >= transients;
         let nodes = plan.nodes.iter().map(|node| {
-            let is_input = |port: &String| node.decl.ports.get(port).is_none_or(|p| p.direction == Direction::Input);
-            let inputs = node.bindings.iter().filter(|(port, target)| is_input(port) && *target != Target::Absent);
+            let inputs = node.bindings.iter().filter(|(port, target)| !is_output(node, port) && *target != Target::Absent);
             let outputs: Vec<ResourceIx> = node.outputs().collect();
             NodeState {
                 inputs: inputs.map(|(_, target)| *target).collect(),

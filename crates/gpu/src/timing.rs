@@ -118,10 +118,13 @@ impl Timer {
         }
     }
 
-    /// Whether a node runs in the frame being recorded.
+    /// Whether a node runs in the frame being recorded; if not, it costs nothing.
     pub(crate) fn set_ran(&mut self, node: usize, ran: bool) {
         if let Some(slot) = self.node_ran.get_mut(node) {
             *slot = ran;
+        }
+        if !ran {
+            self.set_cpu(node, 0);
         }
     }
 
@@ -228,7 +231,7 @@ fn take(slot: &Slot, firsts: &[Option<u32>], period_ns: f64, into: &mut FrameTim
         (node.cpu_ns, node.ran) = (slot.node_cpu_ns[i], slot.node_ran[i]);
         if !node.ran {
             // Its queries hold what an earlier frame wrote.
-            node.gpu_ns = Some(0);
+            node.gpu_ns = firsts[i].map(|_| 0);
             continue;
         }
         let ticks = firsts[i].and_then(|query| tick(query).zip(tick(query + 1)));

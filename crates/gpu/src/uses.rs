@@ -27,15 +27,8 @@ pub(crate) fn is_output(node: &PlanNode, port: &str) -> bool {
 /// Which resources a host node writes.
 pub(crate) fn host_outputs(plan: &Plan) -> Vec<bool> {
     let mut all = vec![false; plan.resources.len()];
-    for node in plan.nodes.iter().filter(|n| n.decl.shader.is_none()) {
-        for (port, target) in &node.bindings {
-            if let Target::Resource(ix) = *target
-                && is_output(node, port)
-            {
-                all[ix] = true;
-            }
-        }
-    }
+    let on_host = plan.nodes.iter().filter(|n| n.decl.shader.is_none());
+    on_host.flat_map(PlanNode::outputs).for_each(|ix| all[ix] = true);
     all
 }
 

@@ -206,4 +206,9 @@ impl Plan {
     pub fn resource(&self, name: &str) -> Option<ResourceIx> {
         self.resources.iter().position(|r| r.name == name)
     }
+
+    /// The value of a parameter of the pipeline.
+    pub fn param(&self, name: &str) -> Option<&Value> {
+        self.params.iter().find(|(known, _)| known == name).map(|(_, value)| value)
+    }
 }

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::{
     assign::Values,
     diagnostics::{Diagnostic, Diagnostics, Severity, Span},
+    expr::Scope,
     order::{self, Dag},
     pipeline::Pipeline,
     plan::{Idle, IdleNode, Lifetime, Plan, PlanInput, PlanNode, PlanResource, Target, Usage},
@@ -189,10 +190,10 @@ impl<'a> Planner<'a, '_> {
         let id = linked.usage.id.text.clone();
         // Nodes without a declaration write nothing that is known, so none is live.
         let decl = std::sync::Arc::clone(linked.decl?);
-        let steps = steps::unroll(&id, &NodeScope { decl: &decl, ports, params: &params, output: self.input.output }, self.out);
-        let frames = decl.settles.as_ref().and_then(|name| params.iter().find(|(known, _)| known == name));
-        let settles = frames
-            .and_then(|(_, value)| if let crate::value::Value::Int(frames @ 1..) = value { u32::try_from(*frames).ok() } else { None });
+        let scope = NodeScope { decl: &decl, ports, params: &params, output: self.input.output };
+        let steps = steps::unroll(&id, &scope, self.out);
+        let frames = decl.settles.as_ref().and_then(|name| scope.param(name)).filter(|frames| *frames > 0);
+        let settles = frames.and_then(|frames| u32::try_from(frames).ok());
         Some(PlanNode { id, stage: linked.usage.stage.clone(), decl, bindings, params, steps, settles })
     }
 
