@@ -11,7 +11,7 @@ use std::{
 use manylight_graph::{
     condition::{Condition, ConditionKind},
     library::Library,
-    pipeline::ArgumentValue,
+    pipeline::{ArgumentValue, Pipeline},
     plan::{Debug, Plan},
     registry::Direction,
     value::ParamKind,
@@ -155,8 +155,9 @@ impl<'a> Subject<'a> {
         let (mut accepted, mut refused, mut faults) = (Vec::new(), Vec::new(), Vec::new());
         // Where no condition asks for the scene, all scenes have the same nodes.
         let pipeline = self.documents.pipeline();
-        let conditions = pipeline.nodes.values().filter_map(|node| node.when.as_ref()).chain(pipeline.refuse.iter().map(|r| &r.when));
-        let asks = conditions.into_iter().any(|when| some_clause(when, &|clause| matches!(clause, ConditionKind::Feature(_))));
+        let asks = pipeline
+            .every_condition()
+            .any(|when| some_clause(pipeline, when, |clause| matches!(clause.kind, ConditionKind::Feature(_) | ConditionKind::Above(..))));
         let scenes = if asks { self.scenes } else { &self.scenes[..1] };
         for row in rows {
             let settings = self.settings(&self.options, row);
@@ -253,11 +254,13 @@ fn only_shows(documents: &Documents, name: &str) -> bool {
     let mut tested = false;
     for node in pipeline.nodes.values() {
         let Some(decl) = documents.registry().nodes.get(&node.node.text) else { return false };
-        let given = |argument: &ArgumentValue| matches!(argument, ArgumentValue::Param(param) if param == name);
+        let given = |argument: &ArgumentValue| {
+            argument.params().contains(&name) || argument.conditions().into_iter().any(|when| tests(pipeline, when, name))
+        };
         if decl.params.contains_key(name) || node.params.values().any(|argument| given(&argument.value)) {
             return false;
         }
-        if node.when.as_ref().is_some_and(|when| tests(when, name)) {
+        if node.when.as_ref().is_some_and(|when| tests(pipeline, when, name)) {
             tested = true;
             let outputs = decl.ports.iter().filter(|(_, port)| port.direction == Direction::Output);
             let resource = |port: &str| node.outputs.get(port).map_or(port.to_owned(), |connection| connection.resource.text.clone());
@@ -270,21 +273,14 @@ fn only_shows(documents: &Documents, name: &str) -> bool {
 }
 
 /// Whether a condition tests a parameter.
-fn tests(condition: &Condition, name: &str) -> bool {
-    some_clause(condition, &|clause| match clause {
-        ConditionKind::Is(param, _) | ConditionKind::IsOn(param) | ConditionKind::AtLeast(param, _) | ConditionKind::Below(param, _) => {
-            param.text == name
-        }
-        _ => false,
-    })
+fn tests(pipeline: &Pipeline, condition: &Condition, name: &str) -> bool {
+    some_clause(pipeline, condition, |clause| clause.params().any(|param| param.text == name))
 }
 
-fn some_clause(condition: &Condition, is: &dyn Fn(&ConditionKind) -> bool) -> bool {
-    match &condition.kind {
-        ConditionKind::All(list) | ConditionKind::Any(list) => list.iter().any(|inner| some_clause(inner, is)),
-        ConditionKind::Not(inner) => some_clause(inner, is),
-        clause => is(clause),
-    }
+fn some_clause(pipeline: &Pipeline, condition: &Condition, is: impl Fn(&Condition) -> bool) -> bool {
+    let mut found = false;
+    pipeline.clauses(condition, &mut |clause| found |= is(clause));
+    found
 }
 
 /// The Cornell box, and a room without a spot light: a point light, a sun, and a block that turns.
@@ -321,7 +317,8 @@ fn stages(documents: &Documents) -> Option<Vec<String>> {
     let resources = pipeline.resources.values().map(|resource| &resource.span);
     let nodes = pipeline.nodes.values().map(|node| &node.id.span);
     let refuse = pipeline.refuse.iter().map(|refusal| &refusal.when.span);
-    let adds = params.chain(resources).chain(nodes).chain(refuse).any(|span| span.source.name == own.name);
+    let conditions = pipeline.conditions.values().map(|condition| &condition.span);
+    let adds = params.chain(resources).chain(nodes).chain(refuse).chain(conditions).any(|span| span.source.name == own.name);
     (!adds).then(|| stages.iter().map(|source| source.name.clone()).collect())
 }
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::{
+    condition::Condition,
     diagnostics::Diagnostic,
     resolve::{Linked, LinkedNode, ParamSource, settable},
     value::{ParamKind, Value},
@@ -63,21 +64,27 @@ impl<'a> Values<'a> {
         self.by_name.insert(name, value);
     }
 
-    /// All parameters of a node.
-    pub fn of_node(&self, node: &LinkedNode<'_>) -> Vec<(String, Value)> {
+    /// All parameters of a node; `holds` decides where a condition does.
+    pub fn of_node(&self, node: &LinkedNode<'_>, holds: &dyn Fn(&Condition) -> bool) -> Vec<(String, Value)> {
         let Some(decl) = node.decl else { return Vec::new() };
         node.params
             .iter()
             .map(|(name, source)| {
                 let kind = &decl.params[*name].kind;
-                let value = self.nodes.get(&format!("{}.{name}", node.usage.id.text)).cloned().unwrap_or_else(|| match source {
-                    ParamSource::Fixed(value) => value.clone(),
-                    ParamSource::Pipeline(own) => convert(self.get(own), kind),
-                    ParamSource::Default => kind.default_value(),
-                });
+                let value =
+                    self.nodes.get(&format!("{}.{name}", node.usage.id.text)).cloned().unwrap_or_else(|| self.from(source, kind, holds));
                 ((*name).to_owned(), value)
             })
             .collect()
+    }
+
+    fn from(&self, source: &ParamSource<'_>, kind: &ParamKind, holds: &dyn Fn(&Condition) -> bool) -> Value {
+        match source {
+            ParamSource::Fixed(value) => value.clone(),
+            ParamSource::Pipeline(own) => convert(self.get(own), kind),
+            ParamSource::Default => kind.default_value(),
+            ParamSource::If(when, then, otherwise) => self.from(if holds(when) { then } else { otherwise }, kind, holds),
+        }
     }
 }
 

@@ -1,10 +1,11 @@
 //! Checks a pipeline without a scene and without a GPU, for every option of every parameter.
 
-use std::{collections::BTreeMap, path::Path, sync::Arc};
+use std::{path::Path, sync::Arc};
 
 use crate::{
     assign::Values,
     diagnostics::{Diagnostic, Diagnostics, Severity, Source},
+    facts::Seen,
     features,
     library::Library,
     pipeline::{Gaps, Pipeline, Preset},
@@ -17,30 +18,35 @@ use crate::{
     value::{ParamKind, Value},
 };
 
+mod constant;
+mod scenes;
+mod variables;
+
+use scenes::{extremes, scenes};
+
 /// The picture's size that sizes are checked with.
 const OUTPUT: (u32, u32) = (1920, 1080);
 
 /// Everything that can be known without a scene: names, types, connections, cycles and sizes, for the defaults and for every option of every
-/// choice and both values of every switch, one at a time, with and without what a scene may have. What the pipeline refuses is not looked at,
-/// unless it is what the pipeline does by itself.
+/// choice and both values of every switch, one at a time, with and without what a scene may have, and with what is measured of it on either side
+/// of every bound. What the pipeline refuses is not looked at, unless it is what the pipeline does by itself. Conditions that have only one
+/// outcome, whatever the values and the scene are, are warnings.
 pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
     let mut out = Vec::new();
-    let linked = link(pipeline, registry, features::KNOWN.to_vec(), &mut out);
+    let linked = link(pipeline, registry, features::flags().collect(), &mut out);
     let values = Values::assign(&linked, &[], &mut out);
     let mut known: Vec<Diagnostic> = Vec::new();
-    let with =
-        |has: &dyn Fn(&str) -> bool| -> BTreeMap<String, bool> { features::KNOWN.iter().map(|f| ((*f).to_owned(), has(f))).collect() };
-    let (none, every) = (with(&|_| false), with(&|_| true));
-    let mut scenes = vec![(every.clone(), String::new()), (none.clone(), "when the scene has no special features".to_owned())];
-    scenes.extend(features::KNOWN.iter().map(|only| (with(&|f| f == *only), format!("when the scene has only `{only}`"))));
-    if scenes.iter().all(|(features, _)| !refused(&linked, &values, &[], features).is_empty()) {
-        out.extend(refused(&linked, &values, &[], &every));
+    let scenes = scenes(&linked, &values);
+    if scenes.iter().all(|scene| !refused(&linked, &values, &[], scene.seen()).is_empty())
+        && let Some(every) = scenes.first()
+    {
+        out.extend(refused(&linked, &values, &[], every.seen()));
     }
-    let mut attempt = |values: &Values<'_>, features: &BTreeMap<String, bool>, when: &str, worst: Severity| {
-        if !refused(&linked, values, &[], features).is_empty() {
+    let mut attempt = |values: &Values<'_>, scene: Seen<'_>, when: &str, worst: Severity| {
+        if !refused(&linked, values, &[], scene).is_empty() {
             return;
         }
-        for fault in faults(&linked, values, features) {
+        for fault in faults(&linked, values, scene) {
             // One cause shows in many variants: it is told once, with the first variant that has it.
             let same = |other: &Diagnostic| {
                 other.labels.first().map(|l| &l.span) == fault.labels.first().map(|l| &l.span) && kind(other) == kind(&fault)
@@ -54,8 +60,8 @@ pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
             out.push(Diagnostic { message, severity, ..fault });
         }
     };
-    for (features, when) in &scenes {
-        attempt(&values, features, when, Severity::Error);
+    for scene in &scenes {
+        attempt(&values, scene.seen(), &scene.when, Severity::Error);
     }
     // Without knowing what is refused, all that would follow from it would be told.
     let is_preset = !pipeline.set.is_empty();
@@ -70,19 +76,22 @@ pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
             let when = format!("when `{name}` is `{value}`");
             let mut changed = values.clone();
             changed.replace(name, value);
-            attempt(&changed, &every, &when, worst);
-            attempt(&changed, &none, &when, worst);
+            for scene in extremes(&linked, &changed) {
+                let when = if scene.when.is_empty() { when.clone() } else { format!("{when} and {}", scene.when) };
+                attempt(&changed, scene.seen(), &when, worst);
+            }
         }
     }
     if pipeline.gaps == Gaps::default() && !out.iter().any(|d| d.severity == Severity::Error) {
         out.extend(unused::find(&linked));
+        out.extend(constant::find(&linked));
     }
     Diagnostics(out).sorted()
 }
 
 /// Checks values that another document (a sweep) gives to parameters of a pipeline, each at its place. Faults of the pipeline itself are not told.
 pub fn check_values<'a>(pipeline: &Pipeline, registry: &Registry, values: impl IntoIterator<Item = (&'a str, &'a Preset)>) -> Diagnostics {
-    let linked = link(pipeline, registry, features::KNOWN.to_vec(), &mut Vec::new());
+    let linked = link(pipeline, registry, features::flags().collect(), &mut Vec::new());
     Diagnostics(values.into_iter().filter_map(|(name, value)| preset_fault(pipeline, &linked.nodes, name, value)).collect())
 }
 
@@ -116,10 +125,10 @@ fn variants(kind: &ParamKind) -> Vec<Value> {
     }
 }
 
-fn faults(linked: &Linked<'_>, values: &Values<'_>, features: &BTreeMap<String, bool>) -> Vec<Diagnostic> {
+fn faults(linked: &Linked<'_>, values: &Values<'_>, scene: Seen<'_>) -> Vec<Diagnostic> {
     let mut out = Vec::new();
-    let input = PlanInput { output: OUTPUT, features: features.clone(), ..PlanInput::default() };
+    let input = PlanInput { output: OUTPUT, features: scene.features.clone(), measured: scene.measured.clone(), ..PlanInput::default() };
     // Values hold names of the same pipeline; a plan is made only for its faults.
-    let _ = Planner { linked, values, input: &input, out: &mut out }.run();
+    let _ = Planner::new(linked, values, &input, &mut out).run();
     out
 }

@@ -1,16 +1,16 @@
-//! Conditions of nodes: RON values over parameters and scene features.
+//! Conditions: RON values over parameters and scene features.
 
-use std::collections::BTreeMap;
+use indexmap::IndexMap;
 
 use crate::{
     diagnostics::Span,
-    reader::{Reader, Spanned},
+    params::check_identifier,
+    reader::{Reader, Shape, Spanned},
     render::suggest,
     tree::{Kind, Tree},
-    value::Value,
 };
 
-/// When a node runs.
+/// When a node runs, a combination of values is refused, or a parameter has one value rather than another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Condition {
     /// What must hold.
@@ -38,86 +38,65 @@ pub enum ConditionKind {
     Below(Spanned, f64),
     /// The scene has this.
     Feature(Spanned),
+    /// What was measured of the scene is more than this, or may be by its error. What was not measured is.
+    Above(Spanned, Bound),
+    /// A choice of `auto`, `on` and `off`: on, or auto and the condition holds.
+    Switch(Spanned, Box<Condition>),
+    /// The condition of this name holds.
+    Holds(Spanned),
 }
 
-/// What a condition came to, with the clause that decided and the values it met.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Verdict {
-    pub holds: bool,
-    pub why: String,
+/// A number that a measured feature is compared with.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Bound {
+    /// Written in the document.
+    Number(f64),
+    /// A number parameter of the pipeline.
+    Param(Spanned),
+}
+
+/// A condition with a name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedCondition {
+    /// What it says, in a sentence.
+    pub doc: String,
+    /// What must hold.
+    pub when: Condition,
+    /// Where its name stands.
+    pub span: Span,
 }
 
 impl Condition {
-    /// Evaluates against parameter values and features; names that are unknown count as "does not hold" (they are reported elsewhere).
-    pub(crate) fn eval(&self, params: &dyn Fn(&str) -> Option<Value>, features: &BTreeMap<String, bool>) -> Verdict {
-        let number = |name: &Spanned| match params(&name.text) {
-            Some(Value::Int(v)) => Some(v as f64),
-            Some(Value::Float(v)) => Some(v),
-            _ => None,
-        };
-        let met = |name: &Spanned| params(&name.text).map_or_else(|| "unknown".to_owned(), |v| v.to_string());
+    /// Calls `visit` for every clause in it that names something: a parameter, a feature or a condition. A switch comes before what it switches;
+    /// what is behind the name of another condition is not visited.
+    pub fn clauses<'a>(&'a self, visit: &mut dyn FnMut(&'a Condition)) {
         match &self.kind {
-            ConditionKind::All(list) => {
-                let verdicts: Vec<_> = list.iter().map(|c| c.eval(params, features)).collect();
-                match verdicts.iter().find(|v| !v.holds) {
-                    Some(first) => first.clone(),
-                    None => Verdict { holds: true, why: join(&verdicts) },
-                }
+            ConditionKind::All(list) | ConditionKind::Any(list) => list.iter().for_each(|c| c.clauses(visit)),
+            ConditionKind::Not(inner) => inner.clauses(visit),
+            ConditionKind::Switch(_, inner) => {
+                visit(self);
+                inner.clauses(visit);
             }
-            ConditionKind::Any(list) => {
-                let verdicts: Vec<_> = list.iter().map(|c| c.eval(params, features)).collect();
-                match verdicts.iter().find(|v| v.holds) {
-                    Some(first) => first.clone(),
-                    None => Verdict { holds: false, why: join(&verdicts) },
-                }
-            }
-            ConditionKind::Not(inner) => {
-                let Verdict { holds, why } = inner.eval(params, features);
-                Verdict { holds: !holds, why }
-            }
-            ConditionKind::Is(name, option) => {
-                let holds = matches!(params(&name.text), Some(Value::Choice(v)) if v == option.text);
-                let verb = if holds { "is" } else { "is not" };
-                let met = if holds { String::new() } else { format!(" but `{}`", met(name)) };
-                Verdict { holds, why: format!("`{}` {verb} `{}`{met}", name.text, option.text) }
-            }
-            ConditionKind::IsOn(name) => {
-                let holds = params(&name.text) == Some(Value::Bool(true));
-                Verdict { holds, why: format!("`{}` is {}", name.text, if holds { "on" } else { "off" }) }
-            }
-            ConditionKind::AtLeast(name, bound) => {
-                let holds = number(name).is_some_and(|v| v >= *bound);
-                let verb = if holds { "at least" } else { "below" };
-                Verdict { holds, why: format!("`{}` is {}, {verb} {bound}", name.text, met(name)) }
-            }
-            ConditionKind::Below(name, bound) => {
-                let holds = number(name).is_some_and(|v| v < *bound);
-                let verb = if holds { "below" } else { "not below" };
-                Verdict { holds, why: format!("`{}` is {}, {verb} {bound}", name.text, met(name)) }
-            }
-            ConditionKind::Feature(name) => {
-                let holds = features.get(&name.text).copied().unwrap_or(false);
-                let verb = if holds { "has" } else { "does not have" };
-                Verdict { holds, why: format!("the scene {verb} `{}`", name.text) }
-            }
-        }
-    }
-
-    /// Calls `visit` for every condition in it that names a parameter or feature.
-    pub(crate) fn leaves<'a>(&'a self, visit: &mut dyn FnMut(&'a Condition)) {
-        match &self.kind {
-            ConditionKind::All(list) | ConditionKind::Any(list) => list.iter().for_each(|c| c.leaves(visit)),
-            ConditionKind::Not(inner) => inner.leaves(visit),
             _ => visit(self),
         }
     }
+
+    /// Names of the parameters that a clause tests by itself.
+    pub fn params(&self) -> impl Iterator<Item = &Spanned> {
+        let tested = match &self.kind {
+            ConditionKind::Is(name, _)
+            | ConditionKind::IsOn(name)
+            | ConditionKind::AtLeast(name, _)
+            | ConditionKind::Below(name, _)
+            | ConditionKind::Switch(name, _)
+            | ConditionKind::Above(_, Bound::Param(name)) => Some(name),
+            _ => None,
+        };
+        tested.into_iter()
+    }
 }
 
-fn join(verdicts: &[Verdict]) -> String {
-    verdicts.iter().map(|v| v.why.as_str()).collect::<Vec<_>>().join("; ")
-}
-
-const FORMS: &[&str] = &["All", "Any", "Not", "Is", "IsOn", "AtLeast", "Below", "Feature"];
+const FORMS: &[&str] = &["All", "Any", "Not", "Is", "IsOn", "AtLeast", "Below", "Feature", "Above", "Switch", "Holds"];
 
 /// Reads a condition.
 pub(crate) fn read(reader: &mut Reader, tree: &Tree) -> Option<Condition> {
@@ -127,7 +106,11 @@ pub(crate) fn read(reader: &mut Reader, tree: &Tree) -> Option<Condition> {
                 reader.error(&tree.range, format!("`{name}` needs something in parentheses"), usage(name));
             }
             Kind::Name(name) => reader.error(&tree.range, format!("unknown condition `{name}`"), suggest(name, FORMS.iter().copied())),
-            _ => reader.expected(tree, "a condition", "conditions are All, Any, Not, Is, IsOn, AtLeast, Below and Feature"),
+            _ => reader.expected(
+                tree,
+                "a condition",
+                "conditions are All, Any, Not, Is, IsOn, AtLeast, Below, Feature, Above, Switch and Holds",
+            ),
         }
         return None;
     };
@@ -151,6 +134,17 @@ pub(crate) fn read(reader: &mut Reader, tree: &Tree) -> Option<Condition> {
             let bound = reader.float(bound, "a number");
             if form == "AtLeast" { ConditionKind::AtLeast(name?, bound?) } else { ConditionKind::Below(name?, bound?) }
         }
+        ("Above", [name, bound]) => {
+            let name = reader.text(name, "the name of a measured feature in quotes");
+            let bound = read_bound(reader, bound);
+            ConditionKind::Above(name?, bound?)
+        }
+        ("Switch", [name, inner]) => {
+            let name = reader.text(name, "the name of a parameter in quotes");
+            let inner = read(reader, inner);
+            ConditionKind::Switch(name?, Box::new(inner?))
+        }
+        ("Holds", [name]) => ConditionKind::Holds(reader.text(name, "the name of a condition in quotes")?),
         _ if FORMS.contains(&form) => {
             reader.error(&tree.range, format!("`{form}` is not used like this"), usage(form));
             return None;
@@ -172,6 +166,55 @@ fn usage(form: &str) -> &'static str {
         "IsOn" => "write `IsOn(\"parameter\")`",
         "AtLeast" => "write `AtLeast(\"parameter\", 32)`",
         "Below" => "write `Below(\"parameter\", 32)`",
+        "Above" => "write `Above(\"feature\", 0.02)` or `Above(\"feature\", Param(\"parameter\"))`",
+        "Switch" => "write `Switch(\"parameter\", a)`",
+        "Holds" => "write `Holds(\"condition\")`",
         _ => "write `Feature(\"name\")`",
     }
+}
+
+fn read_bound(reader: &mut Reader, tree: &Tree) -> Option<Bound> {
+    match &tree.kind {
+        Kind::Tuple(Some(form), items) if form.text == "Param" && items.len() == 1 => {
+            reader.text(&items[0], "the name of a parameter in quotes").map(Bound::Param)
+        }
+        Kind::Number { .. } => reader.float(tree, "a number").map(Bound::Number),
+        _ => {
+            reader.expected(tree, "a number or Param(\"parameter\")", usage("Above"));
+            None
+        }
+    }
+}
+
+const NAMED: Shape = Shape { what: "a condition with a name", required: &["doc", "when"], optional: &[] };
+
+/// No document has more conditions with names.
+const MOST_NAMED: usize = 1000;
+
+/// Reads `conditions: {…}`; the second are the names of those that cannot be read.
+pub(crate) fn read_named(reader: &mut Reader, tree: &Tree) -> (IndexMap<String, NamedCondition>, Vec<String>) {
+    let mut conditions = IndexMap::new();
+    let mut gaps = Vec::new();
+    let given = reader.map(tree, "conditions");
+    if given.len() > MOST_NAMED {
+        reader.error(&tree.range, format!("there are {} conditions, more than the {MOST_NAMED} allowed", given.len()), "");
+        return (conditions, given.into_iter().map(|(name, _)| name.text).collect());
+    }
+    for (name, tree) in given {
+        check_identifier(reader, &name, "condition");
+        if !matches!(tree.kind, Kind::Record(None, _) | Kind::Tuple(None, _)) {
+            reader.expected(tree, "a condition with a name", "write `(doc: \"…\", when: …)`");
+            gaps.push(name.text);
+            continue;
+        }
+        let fields = reader.record(tree, &NAMED);
+        let doc = fields.as_ref().and_then(|f| f.get("doc")).and_then(|t| reader.text(t, "a sentence in quotes"));
+        match fields.as_ref().and_then(|f| f.get("when")).and_then(|t| read(reader, t)) {
+            Some(when) => {
+                conditions.insert(name.text, NamedCondition { doc: doc.map(|d| d.text).unwrap_or_default(), when, span: name.span });
+            }
+            None => gaps.push(name.text),
+        }
+    }
+    (conditions, gaps)
 }

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use indexmap::IndexMap;
 
 use crate::{
-    condition,
+    condition::{self, NamedCondition},
     declaration::read_type,
     diagnostics::{Diagnostic, Source, Span},
     expr, format,
     params::{Literal, check_identifier, read_literal, read_params},
-    pipeline::{Argument, ArgumentValue, Connection, Gaps, Mips, NodeUse, Preset, Refusal, Resource, ResourceKind, Size},
+    pipeline::{Argument, ArgumentValue, Connection, Gaps, Mips, NodeUse, Preset, Refusal, Resource, ResourceKind, Size, ValueAt},
     reader::{Reader, Shape, Spanned, head},
     registry::Param,
     render::suggest,
@@ -28,6 +28,7 @@ pub(crate) struct Document {
     pub include: Vec<Spanned>,
     pub set: Vec<(String, Preset)>,
     pub params: IndexMap<String, Param>,
+    pub conditions: IndexMap<String, NamedCondition>,
     pub resources: IndexMap<String, Resource>,
     pub nodes: Vec<NodeUse>,
     pub refuse: Vec<Refusal>,
@@ -39,9 +40,10 @@ pub(crate) struct Document {
 const PIPELINE: Shape = Shape {
     what: "Pipeline",
     required: &["doc"],
-    optional: &["extends", "set", "include", "params", "resources", "nodes", "refuse", "presents", "radiance"],
+    optional: &["extends", "set", "include", "params", "conditions", "resources", "nodes", "refuse", "presents", "radiance"],
 };
-const STAGE: Shape = Shape { what: "Stage", required: &["doc"], optional: &["include", "params", "resources", "nodes", "refuse"] };
+const STAGE: Shape =
+    Shape { what: "Stage", required: &["doc"], optional: &["include", "params", "conditions", "resources", "nodes", "refuse"] };
 
 /// Reads a file; faults go to `out`.
 pub(crate) fn read(source: &Arc<Source>, stage: &str, out: &mut Vec<Diagnostic>) -> Option<Document> {
@@ -82,6 +84,8 @@ fn read_document(reader: &mut Reader, tree: &Tree, stage: &str) -> Option<Docume
     let params = fields.get("params").map(|t| read_params(reader, t)).unwrap_or_default();
     let declared = fields.get("params").map(keys).unwrap_or_default();
     let mut gaps = Gaps { params: declared.into_iter().filter(|name| !params.contains_key(name)).collect(), ..Gaps::default() };
+    let (conditions, unread) = fields.get("conditions").map(|t| condition::read_named(reader, t)).unwrap_or_default();
+    gaps.conditions.extend(unread);
     let mut resources = IndexMap::new();
     if let Some(tree) = fields.get("resources") {
         for (name, tree) in reader.map(tree, "resources") {
@@ -126,6 +130,7 @@ fn read_document(reader: &mut Reader, tree: &Tree, stage: &str) -> Option<Docume
         include,
         set,
         params,
+        conditions,
         resources,
         nodes,
         refuse,
@@ -289,20 +294,35 @@ fn read_node(reader: &mut Reader, tree: &Tree, stage: &str) -> Option<NodeUse> {
     let mut params = IndexMap::new();
     if let Some(tree) = fields.get("params") {
         for (name, tree) in reader.map(tree, "parameters") {
-            let value = match &tree.kind {
-                Kind::Tuple(Some(form), items) if form.text == "Param" && items.len() == 1 => {
-                    reader.text(&items[0], "the name of a parameter in quotes").map(|n| ArgumentValue::Param(n.text))
-                }
-                _ => read_literal(reader, tree).map(ArgumentValue::Literal),
-            };
-            if let Some(value) = value {
-                params.insert(name.text, Argument { value, name_span: name.span, span: reader.span(&tree.range) });
+            if let Some(ValueAt { value, span }) = read_argument(reader, tree) {
+                params.insert(name.text, Argument { value, name_span: name.span, span });
             }
         }
     }
     let when = fields.get("when").and_then(|t| condition::read(reader, t));
     let broken = reader.out.len() > before;
     Some(NodeUse { id: id?, node: node?, inputs, outputs, params, when, stage: stage.to_owned(), broken })
+}
+
+fn read_argument(reader: &mut Reader, tree: &Tree) -> Option<ValueAt> {
+    let value = match &tree.kind {
+        Kind::Tuple(Some(form), items) => match (form.text.as_str(), items.as_slice()) {
+            ("Param", [name]) => ArgumentValue::Param(reader.text(name, "the name of a parameter in quotes")?.text),
+            ("If", [when, then, otherwise]) => {
+                let when = condition::read(reader, when);
+                let (then, otherwise) = (read_argument(reader, then), read_argument(reader, otherwise));
+                ArgumentValue::If { when: Box::new(when?), then: Box::new(then?), otherwise: Box::new(otherwise?) }
+            }
+            ("Param" | "If", _) => {
+                let usage = if form.text == "If" { "write `If(condition, value, other value)`" } else { "write `Param(\"parameter\")`" };
+                reader.error(&tree.range, format!("`{}` is not used like this", form.text), usage);
+                return None;
+            }
+            _ => ArgumentValue::Literal(read_literal(reader, tree)?),
+        },
+        _ => ArgumentValue::Literal(read_literal(reader, tree)?),
+    };
+    Some(ValueAt { value, span: reader.span(&tree.range) })
 }
 
 fn read_connections(reader: &mut Reader, tree: &Tree, input: bool, found: &mut IndexMap<String, Connection>) {

@@ -38,7 +38,7 @@
 //! | [`ron`] | reading RON with places, for other documents |
 //!
 //! The way of a text: `tree` (RON with places) → `reader` → `declaration` or `document` → `merge` → `resolve` (names) → `planner` (`assign`,
-//! `refuse`, `order`, `sizes`, `steps`, `slots`). The way of a shader: `wgsl` (a look at the text) → `compose` → `reflect` → `bind` (against the declaration).
+//! `facts`, `refuse`, `order`, `sizes`, `steps`, `slots`). The way of a shader: `wgsl` (a look at the text) → `compose` → `reflect` → `bind` (against the declaration).
 
 mod assign;
 mod bind;
@@ -50,6 +50,7 @@ pub mod diagnostics;
 mod document;
 pub mod draw;
 pub mod expr;
+mod facts;
 pub mod features;
 mod fit;
 mod format;

@@ -5,6 +5,7 @@ use std::{collections::BTreeSet, path::Path, sync::Arc};
 use indexmap::{IndexMap, map::Entry};
 
 use crate::{
+    condition::NamedCondition,
     diagnostics::{Diagnostic, Diagnostics, Source, Span},
     document::{self, Document},
     library::{Library, ReadError, stem},
@@ -56,6 +57,7 @@ struct Layer {
     doc: String,
     head: Option<Span>,
     params: IndexMap<String, Param>,
+    conditions: IndexMap<String, NamedCondition>,
     set: IndexMap<String, Preset>,
     resources: IndexMap<String, Resource>,
     nodes: IndexMap<String, NodeUse>,
@@ -156,6 +158,10 @@ impl Loader<'_> {
             let span = param.span.clone();
             self.insert(&mut own.params, name, param, "parameter", |p| p.span.clone(), span);
         }
+        for (name, condition) in stage.conditions {
+            let span = condition.span.clone();
+            self.insert(&mut own.conditions, name, condition, "condition", |c| c.span.clone(), span);
+        }
         for (name, resource) in stage.resources {
             let span = resource.span.clone();
             self.insert(&mut own.resources, name, resource, "resource", |r| r.span.clone(), span);
@@ -170,8 +176,9 @@ impl Loader<'_> {
     }
 
     fn join_document(&mut self, own: &mut Layer, document: Document) {
-        let Document { doc, head, set, params, resources, nodes, refuse, presents, radiance, gaps, .. } = document;
-        let mut layer = Layer { doc, head: Some(head), params, resources, refuse, presents, radiance, gaps, ..Layer::default() };
+        let Document { doc, head, set, params, conditions, resources, nodes, refuse, presents, radiance, gaps, .. } = document;
+        let mut layer =
+            Layer { doc, head: Some(head), params, conditions, resources, refuse, presents, radiance, gaps, ..Layer::default() };
         layer.set.extend(set);
         let before = self.out.len();
         for node in nodes {
@@ -208,10 +215,11 @@ impl Loader<'_> {
 impl Layer {
     /// Lays another over this one: what it gives wins.
     fn overlay(&mut self, over: Self) {
-        let Self { doc, head, params, set, resources, nodes, refuse, presents, radiance, gaps } = over;
+        let Self { doc, head, params, conditions, set, resources, nodes, refuse, presents, radiance, gaps } = over;
         self.doc = doc;
         self.head = head;
         self.params.extend(params);
+        self.conditions.extend(conditions);
         self.set.extend(set);
         self.resources.extend(resources);
         self.nodes.extend(nodes);
@@ -222,7 +230,7 @@ impl Layer {
     }
 
     fn finish(self, name: String, sources: Vec<Arc<Source>>, out: &mut Vec<Diagnostic>) -> Option<Pipeline> {
-        let Self { doc, head, params, set, resources, nodes, refuse, presents, radiance, gaps } = self;
+        let Self { doc, head, params, conditions, set, resources, nodes, refuse, presents, radiance, gaps } = self;
         let Some(presents) = presents else {
             if !gaps.files {
                 let fault = Diagnostic::error("missing field `presents` in Pipeline", head?);
@@ -230,6 +238,6 @@ impl Layer {
             }
             return None;
         };
-        Some(Pipeline { name, doc, params, set, resources, nodes, refuse, presents, radiance, sources, gaps })
+        Some(Pipeline { name, doc, params, conditions, set, resources, nodes, refuse, presents, radiance, sources, gaps })
     }
 }

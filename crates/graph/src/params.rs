@@ -44,6 +44,11 @@ impl ParamKind {
         }
     }
 
+    /// Whether it is a choice of `auto`, `on` and `off`, as `Switch("…", …)` conditions test it.
+    pub fn is_switch(&self) -> bool {
+        matches!(self, Self::Choice { options, .. } if options.len() == SWITCH.len() && SWITCH.iter().all(|s| options.iter().any(|o| o == s)))
+    }
+
     /// Reads a value given as text (`--set clusters=128`).
     ///
     /// # Errors
@@ -129,7 +134,6 @@ fn quoted(names: &[String]) -> String {
     names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
 }
 
-/// Reads a literal value.
 /// Reads a value of a parameter, of whatever type; names without quotes are told.
 pub fn read_literal(reader: &mut Reader, tree: &Tree) -> Option<Literal> {
     match &tree.kind {
@@ -148,7 +152,10 @@ pub fn read_literal(reader: &mut Reader, tree: &Tree) -> Option<Literal> {
     }
 }
 
-const KINDS: &[&str] = &["Int", "Float", "Bool", "Choice"];
+const KINDS: &[&str] = &["Int", "Float", "Bool", "Choice", "Switch"];
+
+/// Options of a switch.
+const SWITCH: [&str; 3] = ["auto", "on", "off"];
 
 /// No document has more parameters.
 const MOST_PARAMS: usize = 1000;
@@ -176,7 +183,7 @@ fn read_param(reader: &mut Reader, name: &Spanned, tree: &Tree) -> Option<Param>
         Kind::Record(Some(n), _) | Kind::Tuple(Some(n), _) => n.text.clone(),
         Kind::Name(n) => n.clone(),
         _ => {
-            reader.expected(tree, "a parameter: Int(…), Float(…), Bool(…) or Choice(…)", "");
+            reader.expected(tree, "a parameter: Int(…), Float(…), Bool(…), Choice(…) or Switch(…)", "");
             return None;
         }
     };
@@ -209,6 +216,11 @@ fn read_param(reader: &mut Reader, name: &Spanned, tree: &Tree) -> Option<Param>
             let options = read_options(reader, f.get("options")?)?;
             let default = reader.text(f.get("default")?, "an option in quotes")?.text;
             ParamKind::Choice { options, default }
+        }
+        "Switch" => {
+            let f = reader.record(tree, &Shape { what: "Switch", required: &["default", "doc"], optional: &[] })?;
+            let default = reader.text(f.get("default")?, "`auto`, `on` or `off` in quotes")?.text;
+            ParamKind::Choice { options: SWITCH.map(str::to_owned).to_vec(), default }
         }
         other => {
             reader.error(&range, format!("unknown parameter type `{other}`"), suggest(other, KINDS.iter().copied()));

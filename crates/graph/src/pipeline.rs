@@ -5,7 +5,7 @@ use std::{collections::BTreeSet, sync::Arc};
 use indexmap::IndexMap;
 
 use crate::{
-    condition::Condition,
+    condition::{Condition, ConditionKind, NamedCondition},
     diagnostics::{Source, Span},
     expr::ExprAt,
     params::Literal,
@@ -23,6 +23,8 @@ pub struct Pipeline {
     pub doc: String,
     /// Parameters in document order.
     pub params: IndexMap<String, Param>,
+    /// Conditions by name, in document order.
+    pub conditions: IndexMap<String, NamedCondition>,
     /// Preset values by `parameter` or `node.parameter`.
     pub set: IndexMap<String, Preset>,
     /// Resources in document order.
@@ -46,6 +48,7 @@ pub struct Pipeline {
 pub(crate) struct Gaps {
     pub params: BTreeSet<String>,
     pub resources: BTreeSet<String>,
+    pub conditions: BTreeSet<String>,
     /// Some node was left out.
     pub nodes: bool,
     /// Some refusal was left out: what it refuses may be faulty.
@@ -58,6 +61,7 @@ impl Gaps {
     pub fn extend(&mut self, other: Self) {
         self.params.extend(other.params);
         self.resources.extend(other.resources);
+        self.conditions.extend(other.conditions);
         self.nodes |= other.nodes;
         self.refuse |= other.refuse;
         self.files |= other.files;
@@ -194,4 +198,82 @@ pub enum ArgumentValue {
     Literal(Literal),
     /// A parameter of the pipeline.
     Param(String),
+    /// One of two values, by a condition.
+    If {
+        /// The condition.
+        when: Box<Condition>,
+        /// The value when it holds.
+        then: Box<ValueAt>,
+        /// The value when it does not.
+        otherwise: Box<ValueAt>,
+    },
+}
+
+/// A value with its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ValueAt {
+    /// The value.
+    pub value: ArgumentValue,
+    /// Where it stands.
+    pub span: Span,
+}
+
+impl ArgumentValue {
+    /// Every condition that it depends on.
+    pub fn conditions(&self) -> Vec<&Condition> {
+        let Self::If { when, then, otherwise } = self else { return Vec::new() };
+        let branches = [then, otherwise].into_iter().flat_map(|branch| branch.value.conditions());
+        std::iter::once(&**when).chain(branches).collect()
+    }
+
+    /// Every parameter of the pipeline that it may be.
+    pub fn params(&self) -> Vec<&str> {
+        match self {
+            Self::Literal(_) => Vec::new(),
+            Self::Param(name) => vec![name],
+            Self::If { then, otherwise, .. } => [then, otherwise].into_iter().flat_map(|branch| branch.value.params()).collect(),
+        }
+    }
+}
+
+impl Pipeline {
+    /// Every condition in it: those with names, of nodes, of their parameters' values and of refusals.
+    pub fn every_condition(&self) -> impl Iterator<Item = &Condition> {
+        let named = self.conditions.values().map(|condition| &condition.when);
+        let nodes = self.nodes.values().flat_map(|node| {
+            let values = node.params.values().flat_map(|argument| argument.value.conditions());
+            node.when.iter().chain(values)
+        });
+        named.chain(nodes).chain(self.refuse.iter().map(|refusal| &refusal.when))
+    }
+
+    /// Calls `visit` for every clause of a condition of this pipeline ([`Condition::clauses`]), and of those that it names, each once.
+    pub fn clauses<'a>(&'a self, condition: &'a Condition, visit: &mut dyn FnMut(&'a Condition)) {
+        let mut seen: BTreeSet<&str> = BTreeSet::new();
+        let mut open = vec![condition];
+        while let Some(condition) = open.pop() {
+            condition.clauses(&mut |clause| {
+                visit(clause);
+                if let ConditionKind::Holds(name) = &clause.kind
+                    && let Some(named) = self.conditions.get(&name.text)
+                    && seen.insert(&name.text)
+                {
+                    open.push(&named.when);
+                }
+            });
+        }
+    }
+
+    /// Names of the measured features that its conditions test: without any, a scene need not be measured.
+    pub fn measured_features(&self) -> BTreeSet<&str> {
+        let mut names = BTreeSet::new();
+        for condition in self.every_condition() {
+            condition.clauses(&mut |clause| {
+                if let ConditionKind::Above(name, _) = &clause.kind {
+                    names.insert(name.text.as_str());
+                }
+            });
+        }
+        names
+    }
 }

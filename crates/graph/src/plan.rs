@@ -3,6 +3,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use crate::{
+    features::Measured,
     registry::{Direction, NodeDecl},
     value::{ResourceDesc, Value},
 };
@@ -16,6 +17,8 @@ pub struct PlanInput {
     pub set: Vec<(String, String)>,
     /// What the scene has, by feature name; a name that is absent is an unknown feature.
     pub features: BTreeMap<String, bool>,
+    /// What was measured of the scene, by feature name; what is absent counts as above every bound, so that nothing is left out for it.
+    pub measured: BTreeMap<String, Measured>,
     /// Sizes of externals; absent ones (in a check without a scene) get a small stand-in.
     pub externals: BTreeMap<String, ResourceDesc>,
     /// Resources to keep although nobody reads them (dumps).
@@ -146,6 +149,8 @@ pub struct PlanNode {
     pub params: Vec<(String, Value)>,
     /// Steps in order, repetitions unrolled; empty for a host node.
     pub steps: Vec<PlanStep>,
+    /// Why its condition holds: the clauses that decided, with the values they met. `None` if it has no condition.
+    pub because: Option<String>,
     /// Frames after which it stops, when nothing but the frame's number and its own history changed; its outputs stay.
     pub settles: Option<u32>,
 }

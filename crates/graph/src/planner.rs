@@ -6,6 +6,7 @@ use crate::{
     assign::Values,
     diagnostics::{Diagnostic, Diagnostics, Severity, Span},
     expr::Scope,
+    facts::{Facts, Seen, Verdict},
     order::{self, Dag},
     pipeline::Pipeline,
     plan::{Idle, IdleNode, Lifetime, Plan, PlanInput, PlanNode, PlanResource, Target, Usage},
@@ -38,13 +39,13 @@ pub fn plan(pipeline: &Pipeline, registry: &Registry, input: &PlanInput) -> Resu
         out.push(fault.help("mend those first; `check` shows them"));
     }
     let values = Values::assign(&linked, &input.set, &mut out);
-    let refused = refuse::refused(&linked, &values, &input.set, &input.features);
+    let refused = refuse::refused(&linked, &values, &input.set, input.into());
     if !refused.is_empty() {
         // What else is wrong with these values follows from it.
         out.extend(refused);
         return Err(Diagnostics(out).sorted());
     }
-    let plan = Planner { linked: &linked, values: &values, input, out: &mut out }.run();
+    let plan = Planner::new(&linked, &values, input, &mut out).run();
     let faults = Diagnostics(out).sorted();
     match plan {
         Some(plan) if !faults.has_errors() => Ok(plan),
@@ -58,7 +59,7 @@ pub fn refusals(pipeline: &Pipeline, registry: &Registry, input: &PlanInput) -> 
     let mut unheard = Vec::new();
     let linked = link(pipeline, registry, input.features.keys().map(String::as_str).collect(), &mut unheard);
     let values = Values::assign(&linked, &input.set, &mut unheard);
-    Diagnostics(refuse::refused(&linked, &values, &input.set, &input.features)).sorted()
+    Diagnostics(refuse::refused(&linked, &values, &input.set, input.into())).sorted()
 }
 
 mod live;
@@ -74,18 +75,34 @@ pub(crate) struct Planner<'a, 'p> {
     pub linked: &'p Linked<'a>,
     pub values: &'p Values<'a>,
     pub input: &'p PlanInput,
+    facts: Facts<'p>,
     pub out: &'p mut Vec<Diagnostic>,
 }
 
 /// What conditions leave: who is on and who writes what.
 struct Activity<'a> {
-    /// Reason for being off, by node.
-    off: Vec<Option<String>>,
+    /// What its condition came to, by node; `None` where it has none.
+    verdicts: Vec<Option<Verdict>>,
     /// The node that writes a resource.
     producer: BTreeMap<&'a str, usize>,
 }
 
-impl<'a> Planner<'a, '_> {
+impl Activity<'_> {
+    fn is_on(&self, node: usize) -> bool {
+        self.verdicts[node].as_ref().is_none_or(|verdict| verdict.holds)
+    }
+
+    /// Why a node is off.
+    fn off(&self, node: usize) -> Option<String> {
+        self.verdicts[node].as_ref().filter(|verdict| !verdict.holds).map(Verdict::why)
+    }
+}
+
+impl<'a, 'p> Planner<'a, 'p> {
+    pub fn new(linked: &'p Linked<'a>, values: &'p Values<'a>, input: &'p PlanInput, out: &'p mut Vec<Diagnostic>) -> Self {
+        Self { linked, values, input, facts: Facts::new(linked, values, Seen::from(input)), out }
+    }
+
     /// The plan, if it can be made; what is in the way goes to `out`.
     pub fn run(mut self) -> Option<Plan> {
         let before = self.out.iter().filter(|d| d.severity == Severity::Error).count();
@@ -130,7 +147,7 @@ impl<'a> Planner<'a, '_> {
         }
         let mut nodes = Vec::with_capacity(order.len());
         for (position, index) in order.iter().enumerate() {
-            nodes.extend(self.node(*index, position, &mut table));
+            nodes.extend(self.node(*index, position, activity, &mut table));
         }
         let presents = table.index.get(self.linked.pipeline.presents.text.as_str()).copied();
         let radiance = self.linked.pipeline.radiance.as_ref().and_then(|r| table.index.get(r.text.as_str()).copied());
@@ -148,7 +165,7 @@ impl<'a> Planner<'a, '_> {
         })
     }
 
-    fn node(&mut self, index: usize, position: usize, table: &mut Table<'a>) -> Option<PlanNode> {
+    fn node(&mut self, index: usize, position: usize, activity: &Activity<'a>, table: &mut Table<'a>) -> Option<PlanNode> {
         let linked = &self.linked.nodes[index];
         let mut bindings = Vec::with_capacity(linked.wires.len());
         let mut ports = BTreeMap::new();
@@ -186,7 +203,7 @@ impl<'a> Planner<'a, '_> {
             }
             bindings.push((port_name.to_owned(), target));
         }
-        let params = self.values.of_node(linked);
+        let params = self.values.of_node(linked, &|condition| self.facts.holds(condition));
         let id = linked.usage.id.text.clone();
         // Nodes without a declaration write nothing that is known, so none is live.
         let decl = std::sync::Arc::clone(linked.decl?);
@@ -194,7 +211,8 @@ impl<'a> Planner<'a, '_> {
         let steps = steps::unroll(&id, &scope, self.out);
         let frames = decl.settles.as_ref().and_then(|name| scope.param(name)).filter(|frames| *frames > 0);
         let settles = frames.and_then(|frames| u32::try_from(frames).ok());
-        Some(PlanNode { id, stage: linked.usage.stage.clone(), decl, bindings, params, steps, settles })
+        let because = activity.verdicts[index].as_ref().map(Verdict::why);
+        Some(PlanNode { id, stage: linked.usage.stage.clone(), decl, bindings, params, steps, because, settles })
     }
 
     fn idle(&self, activity: &Activity<'a>, runs: &BTreeSet<usize>) -> Vec<IdleNode> {
@@ -204,7 +222,7 @@ impl<'a> Planner<'a, '_> {
                 id: node.usage.id.text.clone(),
                 stage: node.usage.stage.clone(),
                 kind: node.usage.node.text.clone(),
-                reason: activity.off[index].clone().map_or(Idle::Dead, Idle::Off),
+                reason: activity.off(index).map_or(Idle::Dead, Idle::Off),
             })
             .collect()
     }

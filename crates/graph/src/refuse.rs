@@ -1,48 +1,44 @@
 //! Combinations of values that a pipeline refuses, and what to do instead.
 
-use std::collections::BTreeMap;
-
 use crate::{
     assign::Values,
-    condition::{Condition, ConditionKind},
+    condition::{Bound, Condition, ConditionKind},
     diagnostics::Diagnostic,
+    facts::{Facts, Seen},
+    features::Measured,
     pipeline::Refusal,
     resolve::Linked,
     value::{ParamKind, Value},
 };
 
 /// An error for each refusal that the values meet. `given` are those from outside: of the others, the place where a preset sets them is shown.
-pub(crate) fn refused(
-    linked: &Linked<'_>,
-    values: &Values<'_>,
-    given: &[(String, String)],
-    features: &BTreeMap<String, bool>,
-) -> Vec<Diagnostic> {
-    let refusals = Refusals { linked, values, features };
-    let met = linked.pipeline.refuse.iter().filter(|refusal| refusals.holds(refusal, values));
+pub(crate) fn refused(linked: &Linked<'_>, values: &Values<'_>, given: &[(String, String)], seen: Seen<'_>) -> Vec<Diagnostic> {
+    let refusals = Refusals { linked, values, seen, facts: Facts::new(linked, values, seen) };
+    let met = linked.pipeline.refuse.iter().filter(|refusal| refusals.facts.holds(&refusal.when));
     met.map(|refusal| refusals.fault(refusal, given)).collect()
 }
 
 struct Refusals<'l, 'a> {
     linked: &'l Linked<'a>,
     values: &'l Values<'a>,
-    features: &'l BTreeMap<String, bool>,
+    seen: Seen<'l>,
+    facts: Facts<'l>,
 }
 
 impl<'a> Refusals<'_, 'a> {
-    fn holds(&self, refusal: &Refusal, values: &Values<'_>) -> bool {
-        refusal.when.eval(&|name| values.get(name).cloned(), self.features).holds
-    }
-
     fn fault(&self, refusal: &'a Refusal, given: &[(String, String)]) -> Diagnostic {
-        let met = refusal.when.eval(&|name| self.values.get(name).cloned(), self.features);
+        let met = self.facts.verdict(&refusal.when);
         let reason = refusal.because.trim_end_matches('.');
-        let mut fault = Diagnostic::error(format!("these values are refused: {reason}"), refusal.when.span.clone()).at(met.why);
+        let mut fault = Diagnostic::error(format!("these values are refused: {reason}"), refusal.when.span.clone()).at(met.why());
         let mut remedies: Vec<String> = Vec::new();
         let mut names: Vec<&str> = Vec::new();
-        refusal.when.leaves(&mut |leaf| {
-            names.extend(named(leaf).filter(|name| !names.contains(name)));
-            remedies.extend(self.scene(leaf, refusal));
+        self.linked.pipeline.clauses(&refusal.when, &mut |clause| {
+            for name in clause.params().map(|name| name.text.as_str()) {
+                if !names.contains(&name) {
+                    names.push(name);
+                }
+            }
+            remedies.extend(self.scene(clause, refusal).filter(|remedy| !remedies.contains(remedy)));
         });
         for name in &names {
             let preset = self.linked.pipeline.set.get(*name).filter(|_| !given.iter().any(|(other, _)| other == name));
@@ -61,10 +57,12 @@ impl<'a> Refusals<'_, 'a> {
         let better = |value: &Value| {
             let mut changed = self.values.clone();
             changed.replace(own, value.clone());
+            let changed = Facts::new(self.linked, &changed, self.seen);
             let others = &self.linked.pipeline.refuse;
-            !self.holds(refusal, &changed) && others.iter().all(|other| !self.holds(other, &changed) || self.holds(other, self.values))
+            !changed.holds(&refusal.when) && others.iter().all(|other| !changed.holds(&other.when) || self.facts.holds(&other.when))
         };
-        let good: Vec<String> = candidates(&param.kind, name, &refusal.when).into_iter().filter(better).map(|v| v.to_string()).collect();
+        let good: Vec<String> =
+            self.candidates(&param.kind, name, &refusal.when).into_iter().filter(better).map(|v| v.to_string()).collect();
         let last = good.last()?;
         let list = match &good[..good.len() - 1] {
             [] => format!("`{last}`"),
@@ -74,47 +72,61 @@ impl<'a> Refusals<'_, 'a> {
     }
 
     /// The other kind of scene, where that would be accepted.
-    fn scene(&self, leaf: &Condition, refusal: &Refusal) -> Option<String> {
-        let ConditionKind::Feature(name) = &leaf.kind else { return None };
-        let has = self.features.get(&name.text).copied().unwrap_or(false);
-        let mut features = self.features.clone();
-        features.insert(name.text.clone(), !has);
-        let other = Refusals { features: &features, linked: self.linked, values: self.values };
-        (!other.holds(refusal, self.values)).then(|| format!("take a scene {} `{}`", if has { "without" } else { "with" }, name.text))
+    fn scene(&self, clause: &Condition, refusal: &Refusal) -> Option<String> {
+        let (mut features, mut measured) = (self.seen.features.clone(), self.seen.measured.clone());
+        let remedy = match &clause.kind {
+            ConditionKind::Feature(name) => {
+                let has = features.insert(name.text.clone(), true).unwrap_or(false);
+                features.insert(name.text.clone(), !has);
+                format!("take a scene {} `{}`", if has { "without" } else { "with" }, name.text)
+            }
+            ConditionKind::Above(name, _) => {
+                let other = if self.facts.holds(clause) { 0.0 } else { f64::INFINITY };
+                measured.insert(name.text.clone(), Measured { value: other, standard_error: 0.0 });
+                format!("take a scene with {} `{}`", if other > 0.0 { "more" } else { "less" }, name.text)
+            }
+            _ => return None,
+        };
+        let seen = Seen { features: &features, measured: &measured };
+        (!Facts::new(self.linked, self.values, seen).holds(&refusal.when)).then_some(remedy)
+    }
+
+    /// Values that may end a refusal: all options; of numbers, those on both sides of the bounds that it tests, and of what was measured.
+    fn candidates(&self, kind: &ParamKind, name: &str, when: &'a Condition) -> Vec<Value> {
+        let mut bounds = Vec::new();
+        let mut estimates = Vec::new();
+        self.linked.pipeline.clauses(when, &mut |clause| match &clause.kind {
+            ConditionKind::AtLeast(tested, bound) | ConditionKind::Below(tested, bound) if tested.text == name => bounds.push(*bound),
+            ConditionKind::Above(feature, Bound::Param(tested)) if tested.text == name => {
+                estimates.extend(self.seen.measured.get(&feature.text).map(Measured::at_most));
+            }
+            _ => {}
+        });
+        match kind {
+            ParamKind::Bool { .. } => vec![Value::Bool(false), Value::Bool(true)],
+            ParamKind::Choice { options, .. } => options.iter().cloned().map(Value::Choice).collect(),
+            ParamKind::Int { min, max, .. } => {
+                let sides = bounds.iter().chain(&estimates).flat_map(|bound| [bound.ceil() as i64 - 1, bound.ceil() as i64]);
+                sides.filter(|value| (*min..=*max).contains(value)).map(Value::Int).collect()
+            }
+            // Just below a bound is no number that anyone would write.
+            ParamKind::Float { min, max, .. } => {
+                let sides = bounds.iter().flat_map(|bound| [*min, *bound]);
+                let around = estimates.iter().flat_map(|estimate| [*min, short_above(*estimate)]);
+                sides.chain(around).filter(|value| (*min..=*max).contains(value)).map(Value::Float).collect()
+            }
+        }
     }
 }
 
-/// The parameter that a clause tests.
-fn named(leaf: &Condition) -> Option<&str> {
-    match &leaf.kind {
-        ConditionKind::Is(name, _) | ConditionKind::IsOn(name) | ConditionKind::AtLeast(name, _) | ConditionKind::Below(name, _) => {
-            Some(&name.text)
-        }
-        _ => None,
+/// A number that is not below, with two digits.
+fn short_above(value: f64) -> f64 {
+    if !value.is_finite() || value <= 0.0 {
+        return value;
     }
-}
-
-/// Values that may end a refusal: all options; of numbers, those on both sides of the bounds that it tests.
-fn candidates(kind: &ParamKind, name: &str, when: &Condition) -> Vec<Value> {
-    let mut bounds = Vec::new();
-    when.leaves(&mut |leaf| {
-        if let ConditionKind::AtLeast(tested, bound) | ConditionKind::Below(tested, bound) = &leaf.kind
-            && tested.text == name
-        {
-            bounds.push(*bound);
-        }
-    });
-    match kind {
-        ParamKind::Bool { .. } => vec![Value::Bool(false), Value::Bool(true)],
-        ParamKind::Choice { options, .. } => options.iter().cloned().map(Value::Choice).collect(),
-        ParamKind::Int { min, max, .. } => {
-            let sides = bounds.iter().flat_map(|bound| [bound.ceil() as i64 - 1, bound.ceil() as i64]);
-            sides.filter(|value| (*min..=*max).contains(value)).map(Value::Int).collect()
-        }
-        // Just below a bound is no number that anyone would write.
-        ParamKind::Float { min, max, .. } => {
-            let sides = bounds.iter().flat_map(|bound| [*min, *bound]);
-            sides.filter(|value| (*min..=*max).contains(value)).map(Value::Float).collect()
-        }
-    }
+    let step = 10f64.powi(value.log10().floor() as i32 - 1);
+    let steps = (value / step).ceil();
+    // Through its text: so many steps of a power of ten are seldom the number that it would be written as.
+    let exponent = step.log10().round() as i32;
+    format!("{steps}e{exponent}").parse().unwrap_or(value)
 }

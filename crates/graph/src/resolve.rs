@@ -9,6 +9,7 @@ use std::{
 use indexmap::IndexMap;
 
 use crate::{
+    condition::Condition,
     diagnostics::{Diagnostic, Span},
     fit,
     pipeline::{Connection, Mips, NodeUse, Pipeline, ResourceKind},
@@ -23,6 +24,8 @@ pub(crate) struct Linked<'a> {
     pub registry: &'a Registry,
     /// In document order.
     pub nodes: Vec<LinkedNode<'a>>,
+    /// Names of the conditions that can be decided, each after those that it names.
+    pub conditions: Vec<&'a str>,
     /// Some node's ports are unknown, so anything may have been written by it.
     pub incomplete: bool,
     /// Resources whose connections are faulty: nothing more is said of them.
@@ -62,6 +65,7 @@ pub(crate) enum ParamSource<'a> {
     Fixed(Value),
     Pipeline(&'a str),
     Default,
+    If(&'a Condition, Box<ParamSource<'a>>, Box<ParamSource<'a>>),
 }
 
 impl<'a> LinkedNode<'a> {
@@ -90,6 +94,8 @@ struct Linker<'a, 'o> {
     mistyped: BTreeSet<String>,
     /// Something that the condition at hand names is not known.
     undecided: bool,
+    /// Conditions with names, once they are looked at: whether they can be decided.
+    decided: BTreeMap<&'a str, bool>,
     out: &'o mut Vec<Diagnostic>,
 }
 
@@ -103,18 +109,20 @@ pub(crate) fn link<'a>(pipeline: &'a Pipeline, registry: &'a Registry, features:
         tainted: BTreeSet::new(),
         mistyped: BTreeSet::new(),
         undecided: false,
+        decided: BTreeMap::new(),
         out,
     };
     linker.incomplete = pipeline.gaps.nodes || pipeline.gaps.files;
     linker.tainted.extend(pipeline.gaps.resources.iter().cloned());
     linker.resources();
+    let conditions = linker.conditions();
     let nodes: Vec<_> = pipeline.nodes.values().map(|node| linker.node(node)).collect();
     linker.presets(&nodes);
     let refusals_unclear = linker.refusals();
     linker.never_written(&nodes);
     linker.shown();
     let Linker { incomplete, tainted, .. } = linker;
-    Linked { pipeline, registry, nodes, incomplete, tainted, refusals_unclear }
+    Linked { pipeline, registry, nodes, conditions, incomplete, tainted, refusals_unclear }
 }
 
 impl<'a> Linker<'a, '_> {

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::{
-    condition::ConditionKind,
+    condition::{Condition, ConditionKind},
     diagnostics::Diagnostic,
     expr::RefKind,
     pipeline::{Mips, ResourceKind, Size},
@@ -49,21 +49,24 @@ pub(crate) fn find(linked: &Linked<'_>) -> Vec<Diagnostic> {
             }
         }
         for (_, source) in &node.params {
-            if let ParamSource::Pipeline(name) = source {
-                params.insert(name);
+            taken(source, &mut params);
+        }
+    }
+    let mut conditions: BTreeSet<&str> = BTreeSet::new();
+    let named = linked.pipeline.conditions.values().map(|condition| &condition.when);
+    let refusals = linked.pipeline.refuse.iter().map(|refusal| &refusal.when);
+    let nodes = linked.pipeline.nodes.values().flat_map(|node| {
+        let values = node.params.values().flat_map(|argument| argument.value.conditions());
+        node.when.iter().chain(values)
+    });
+    // To refuse a value of a parameter is no use of it.
+    for (condition, uses) in named.chain(nodes).map(|c| (c, true)).chain(refusals.map(|c| (c, false))) {
+        condition.clauses(&mut |clause: &Condition| {
+            if let ConditionKind::Holds(name) = &clause.kind {
+                conditions.insert(&name.text);
             }
-        }
-        if let Some(when) = &node.usage.when {
-            when.leaves(&mut |leaf| {
-                if let ConditionKind::Is(name, _)
-                | ConditionKind::IsOn(name)
-                | ConditionKind::AtLeast(name, _)
-                | ConditionKind::Below(name, _) = &leaf.kind
-                {
-                    params.insert(&name.text);
-                }
-            });
-        }
+            params.extend(clause.params().filter(|_| uses).map(|name| name.text.as_str()));
+        });
     }
     let mut out = Vec::new();
     for (name, resource) in
@@ -74,5 +77,22 @@ pub(crate) fn find(linked: &Linked<'_>) -> Vec<Diagnostic> {
     for (name, param) in linked.pipeline.params.iter().filter(|(n, _)| !params.contains(n.as_str())) {
         out.push(Diagnostic::warning(format!("nothing uses the parameter `{name}`"), param.span.clone()).help("use it or remove it"));
     }
+    for (name, condition) in linked.pipeline.conditions.iter().filter(|(n, _)| !conditions.contains(n.as_str())) {
+        out.push(Diagnostic::warning(format!("nothing uses the condition `{name}`"), condition.span.clone()).help("use it or remove it"));
+    }
     out
+}
+
+/// Parameters of the pipeline that a node's parameter takes its value from.
+fn taken<'a>(source: &ParamSource<'a>, params: &mut BTreeSet<&'a str>) {
+    match source {
+        ParamSource::Pipeline(name) => {
+            params.insert(name);
+        }
+        ParamSource::If(_, then, otherwise) => {
+            taken(then, params);
+            taken(otherwise, params);
+        }
+        ParamSource::Fixed(_) | ParamSource::Default => {}
+    }
 }

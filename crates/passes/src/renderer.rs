@@ -209,6 +209,7 @@ pub fn plan_input(settings: &Settings, scene: &Scene) -> PlanInput {
         output: settings.size,
         set: settings.set.clone(),
         features: features(settings, scene),
+        measured: BTreeMap::new(),
         externals: descriptions(scene, settings.baked.as_deref()),
         keep: settings.keep.clone(),
         keep_unchanged: settings.skip_unchanged,

@@ -115,7 +115,7 @@ fn check_plan(plan: &Plan) {
 
 /// A plan of a pipeline without faults for a scene that has everything or nothing.
 fn input(has: bool) -> PlanInput {
-    PlanInput { output: (96, 64), features: features::KNOWN.iter().map(|name| ((*name).to_owned(), has)).collect(), ..PlanInput::default() }
+    PlanInput { output: (96, 64), features: features::flags().map(|name| (name.to_owned(), has)).collect(), ..PlanInput::default() }
 }
 
 /// Reads, checks and plans a pipeline. Whether it has no faults.

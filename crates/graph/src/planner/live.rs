@@ -19,21 +19,18 @@ const MOST_TOLD: usize = 3;
 
 impl<'a> Planner<'a, '_> {
     pub(super) fn activity(&mut self) -> Activity<'a> {
-        let get = |name: &str| self.values.get(name).cloned();
-        let off: Vec<Option<String>> = self
-            .linked
-            .nodes
-            .iter()
-            .map(|node| {
-                let verdict = node.usage.when.as_ref()?.eval(&get, &self.input.features);
-                (!verdict.holds).then_some(verdict.why)
-            })
-            .collect();
-        let mut producer: BTreeMap<&'a str, usize> = BTreeMap::new();
-        for (index, node) in self.linked.nodes.iter().enumerate().filter(|(index, _)| off[*index].is_none()) {
+        let conditions = self.linked.nodes.iter().map(|node| node.usage.when.as_ref());
+        let verdicts = conditions.map(|when| when.map(|when| self.facts.verdict(when))).collect();
+        let mut activity = Activity { verdicts, producer: BTreeMap::new() };
+        for (index, node) in self.linked.nodes.iter().enumerate() {
+            if !activity.is_on(index) {
+                continue;
+            }
             for (_, port, wire) in node.ports() {
                 let (Direction::Output, Wire::Resource { name, span, .. }) = (port.direction, wire) else { continue };
-                match producer.get(name) {
+                match activity.producer.get(name) {
+                    // Whether one of them runs may be unknown.
+                    Some(other) if *other != index && self.linked.tainted.contains(name) => {}
                     Some(other) if *other != index => {
                         let other = &self.linked.nodes[*other].usage.id;
                         self.out.push(
@@ -46,12 +43,12 @@ impl<'a> Planner<'a, '_> {
                         );
                     }
                     _ => {
-                        producer.insert(name, index);
+                        activity.producer.insert(name, index);
                     }
                 }
             }
         }
-        Activity { off, producer }
+        activity
     }
 
     /// Resources that a node reads, with the last frame's told apart.
@@ -71,7 +68,7 @@ impl<'a> Planner<'a, '_> {
         for index in 0..self.linked.nodes.len() {
             dag.add_node(index);
         }
-        for (index, _) in activity.off.iter().enumerate().filter(|(_, off)| off.is_none()) {
+        for index in (0..self.linked.nodes.len()).filter(|index| activity.is_on(*index)) {
             for (resource, previous, _, span) in self.reads(index) {
                 if let (false, Some(from)) = (previous, activity.producer.get(resource)) {
                     dag.update_edge(NodeIndex::new(*from), NodeIndex::new(index), Read { resource, span });
@@ -162,7 +159,7 @@ impl<'a> Planner<'a, '_> {
     /// With culling off: live nodes, and all others that have what they need.
     pub(super) fn runnable(&self, activity: &Activity<'a>, live: &BTreeSet<usize>) -> BTreeSet<usize> {
         let mut runs: BTreeSet<usize> =
-            (0..self.linked.nodes.len()).filter(|n| activity.off[*n].is_none() && self.linked.nodes[*n].decl.is_some()).collect();
+            (0..self.linked.nodes.len()).filter(|n| activity.is_on(*n) && self.linked.nodes[*n].decl.is_some()).collect();
         loop {
             let lacking: Vec<usize> = runs
                 .iter()
@@ -186,7 +183,7 @@ impl<'a> Planner<'a, '_> {
             .nearly_on(resource, activity)
             .into_iter()
             .filter_map(|index| {
-                let why = activity.off[index].as_ref()?;
+                let why = activity.off(index)?;
                 Some(format!("node `{}`, which writes it, is off: {why}", self.linked.nodes[index].usage.id.text))
             })
             .collect();
@@ -196,7 +193,6 @@ impl<'a> Planner<'a, '_> {
     /// Nodes that would write a resource but are off; of many, where some fulfil more clauses of their conditions than others, only those:
     /// of seven views, the one that was chosen.
     fn nearly_on(&self, resource: &str, activity: &Activity<'a>) -> Vec<usize> {
-        let get = |name: &str| self.values.get(name).cloned();
         let writes = |index: &usize| {
             self.linked.nodes[*index].ports().any(|(_, port, wire)| {
                 port.direction == Direction::Output && matches!(wire, Wire::Resource { name, .. } if name == resource)
@@ -204,12 +200,12 @@ impl<'a> Planner<'a, '_> {
         };
         let fulfilled = |index: usize| -> usize {
             match self.linked.nodes[index].usage.when.as_ref().map(|when| &when.kind) {
-                Some(ConditionKind::All(clauses)) => clauses.iter().filter(|c| c.eval(&get, &self.input.features).holds).count(),
+                Some(ConditionKind::All(clauses)) => clauses.iter().filter(|c| self.facts.holds(c)).count(),
                 _ => 0,
             }
         };
         let off: Vec<(usize, usize)> = (0..self.linked.nodes.len())
-            .filter(|index| activity.off[*index].is_some() && writes(index))
+            .filter(|index| !activity.is_on(*index) && writes(index))
             .map(|index| (index, fulfilled(index)))
             .collect();
         let most = if off.len() > MOST_TOLD { off.iter().map(|(_, count)| *count).max().unwrap_or(0) } else { 0 };

@@ -2,8 +2,8 @@
 
 use super::{LinkedNode, Linker, ParamSource};
 use crate::{
-    diagnostics::Diagnostic,
-    pipeline::{ArgumentValue, NodeUse, Pipeline},
+    diagnostics::{Diagnostic, Span},
+    pipeline::{ArgumentValue, NodeUse, Pipeline, ValueAt},
     registry::NodeDecl,
     render::suggest,
     value::ParamKind,
@@ -40,12 +40,23 @@ impl<'a> Linker<'a, '_> {
                 _ => ParamSource::Default,
             };
         };
-        match &argument.value {
+        self.value(usage, name, param, &argument.value, &argument.span)
+    }
+
+    fn value(
+        &mut self,
+        usage: &'a NodeUse,
+        name: &str,
+        param: &'a crate::registry::Param,
+        value: &'a ArgumentValue,
+        span: &'a Span,
+    ) -> ParamSource<'a> {
+        match value {
             ArgumentValue::Literal(literal) => match param.kind.accept(literal) {
                 Ok(value) => ParamSource::Fixed(value),
                 Err(remedy) => {
                     self.push(
-                        Diagnostic::error(format!("{literal} is no value of the parameter `{name}`"), argument.span.clone())
+                        Diagnostic::error(format!("{literal} is no value of the parameter `{name}`"), span.clone())
                             .and(param.span.clone(), "the parameter")
                             .help(remedy),
                     );
@@ -58,7 +69,7 @@ impl<'a> Linker<'a, '_> {
                         self.push(
                             Diagnostic::error(
                                 format!("parameter `{own_name}` does not fit `{name}` of node `{}`: {why}", usage.id.text),
-                                argument.span.clone(),
+                                span.clone(),
                             )
                             .and(own.span.clone(), "the pipeline's parameter")
                             .and(param.span.clone(), "the node's parameter")
@@ -68,10 +79,16 @@ impl<'a> Linker<'a, '_> {
                     ParamSource::Pipeline(own_name)
                 }
                 None => {
-                    self.unknown_param(own_name, &argument.span);
+                    self.unknown_param(own_name, span);
                     ParamSource::Default
                 }
             },
+            ArgumentValue::If { when, then, otherwise } => {
+                self.condition(when);
+                let mut branch = |of: &'a ValueAt| Box::new(self.value(usage, name, param, &of.value, &of.span));
+                let (then, otherwise) = (branch(then), branch(otherwise));
+                ParamSource::If(when, then, otherwise)
+            }
         }
     }
 }

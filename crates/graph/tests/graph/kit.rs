@@ -261,7 +261,7 @@ pub fn registry(files: &Files, host: &[HostDecl]) -> (Registry, Diagnostics) {
 pub fn input() -> PlanInput {
     PlanInput {
         output: (640, 360),
-        features: features::KNOWN.iter().map(|f| ((*f).to_owned(), false)).collect(),
+        features: features::flags().map(|name| (name.to_owned(), false)).collect(),
         externals: [("scene_triangles".to_owned(), ResourceDesc::Buffer { element: "u32".into(), stride: 4, count: 12 })].into(),
         ..PlanInput::default()
     }

@@ -1,6 +1,7 @@
 //! Tests of the crate from outside.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod conditions;
 mod drawing;
 mod good;
 mod invariants;

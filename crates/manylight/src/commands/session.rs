@@ -56,7 +56,7 @@ impl Session {
             None => PlanInput {
                 output: settings.size,
                 set: settings.set.clone(),
-                features: manylight::graph::features::KNOWN.iter().map(|name| ((*name).to_owned(), false)).collect(),
+                features: manylight::graph::features::flags().map(|name| (name.to_owned(), false)).collect(),
                 keep: settings.keep.clone(),
                 debug: settings.debug,
                 ..PlanInput::default()
