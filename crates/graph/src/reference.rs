@@ -7,6 +7,7 @@ use serde_json::{Value as Json, json};
 use crate::{
     diagnostics::Diagnostic,
     draw::value,
+    features::{KNOWN, MEASURED},
     fit::describe,
     registry::{Direction, NodeDecl, Port, Registry},
     render::suggest,
@@ -24,7 +25,7 @@ pub fn find<'a>(registry: &'a Registry, name: &str) -> Result<&'a Arc<NodeDecl>,
     })
 }
 
-/// A line for each node: name and first sentence.
+/// A line for each node: name and first sentence; then what conditions can ask of a scene.
 pub fn text(registry: &Registry) -> String {
     let width = registry.nodes.keys().map(String::len).max().unwrap_or(0);
     let mut out = String::new();
@@ -32,7 +33,18 @@ pub fn text(registry: &Registry) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(out, "{:width$}  {}", node.name, first_sentence(&node.doc));
     }
+    let width = features().map(|(condition, _)| condition.len()).max().unwrap_or(0);
+    out.push_str("\nfeatures of a scene, for conditions:\n");
+    for (condition, doc) in features() {
+        let _ = writeln!(out, "  {condition:width$}  {doc}");
+    }
     out
+}
+
+/// How conditions ask for each feature of a scene, and what it is.
+fn features() -> impl Iterator<Item = (String, &'static str)> {
+    let flags = KNOWN.iter().map(|flag| (format!("Feature(\"{}\")", flag.name), flag.doc));
+    flags.chain(MEASURED.iter().map(|feature| (format!("Above(\"{}\", …)", feature.name), feature.doc)))
 }
 
 /// All of a node, for a terminal.
@@ -71,7 +83,7 @@ fn what(port: &Port) -> String {
     describe(&port.kind) + &bounds.concat()
 }
 
-/// A page with every node, by stage, and the scene's data.
+/// A page with every node, by stage, the scene's data and its features.
 pub fn markdown(registry: &Registry) -> String {
     let mut out = String::from("# Nodes\n");
     let mut stage = "";
@@ -88,6 +100,10 @@ pub fn markdown(registry: &Registry) -> String {
         for external in registry.externals.values() {
             let _ = writeln!(out, "| `{}` | {} | {} |", external.name, cell(&describe(&external.kind)), cell(&external.doc));
         }
+    }
+    out.push_str("\n## Scene features\n\n| condition | what |\n|---|---|\n");
+    for (condition, doc) in features() {
+        let _ = writeln!(out, "| `{condition}` | {} |", cell(doc));
     }
     out
 }
@@ -121,12 +137,16 @@ pub fn node_markdown(node: &NodeDecl) -> String {
     out
 }
 
-/// Every node and the scene's data.
+/// Every node, the scene's data and its features; what is measured has a greatest value, where it has one.
 pub fn json(registry: &Registry) -> Json {
     let externals = registry.externals.values().map(|e| json!({ "name": e.name, "is": describe(&e.kind), "doc": e.doc }));
+    // JSON has no infinity: a feature without a greatest value has none.
+    let measured = MEASURED.iter().map(|f| json!({ "name": f.name, "doc": f.doc, "at_most": f.most }));
     json!({
         "nodes": registry.nodes.values().map(|node| node_json(node)).collect::<Vec<_>>(),
         "externals": externals.collect::<Vec<_>>(),
+        "features": KNOWN.iter().map(|flag| json!({ "name": flag.name, "doc": flag.doc })).collect::<Vec<_>>(),
+        "measured_features": measured.collect::<Vec<_>>(),
     })
 }
 
