@@ -1,9 +1,13 @@
-//! Where scenes, meshes and textures are read from, and what was read.
+//! Where scenes, meshes and textures are read from, and what was read; files that are written whole.
+
+mod whole;
 
 use std::{
     fs, io,
     path::{Component, Path, PathBuf},
 };
+
+pub use whole::{NotWritten, Output, write_whole};
 
 /// A source of files by path. Any `Fn(&Path) -> io::Result<Vec<u8>>` is one.
 pub trait FileReader {

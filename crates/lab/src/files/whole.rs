@@ -1,16 +1,15 @@
-//! Files that appear whole or not at all.
+//! Files that appear whole or not at all, with faults that say what to do.
 
 use std::{
-    fs::{self, File, TryLockError},
-    io::{self, BufWriter, Seek, SeekFrom, Write},
+    io::{BufWriter, Write},
     path::{Path, PathBuf},
-    sync::atomic::{AtomicU64, Ordering},
 };
 
-use super::FileError;
+use manylight_scene::files::{self, NotWritten};
 
-/// End of the names of files that are not complete.
-const PART: &str = ".part";
+pub use manylight_scene::files::Output;
+
+use super::FileError;
 
 /// Checks, before any work is done, that a file of this name can be written: its folder exists and it is no folder itself.
 pub fn check_writable(path: &Path) -> Result<(), FileError> {
@@ -32,63 +31,10 @@ pub fn check_writable(path: &Path) -> Result<(), FileError> {
 /// When `fill` or the disk fails, nothing is left behind and an older file of that name stays as it was.
 pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<Output>) -> Result<(), FileError>) -> Result<(), FileError> {
     check_writable(path)?;
-    let (temporary, file) = create_beside(path)?;
-    let guard = RemoveOnDrop(Some(&temporary));
-    let mut writer = BufWriter::new(Output { file, fault: None });
-    // On the disk before it has its name: a power cut must not leave an empty file where an older one was.
-    let written = fill(&mut writer).and_then(|()| {
-        let flushed = writer.flush().and_then(|()| writer.get_ref().file.sync_data());
-        flushed.map_err(|e| FileError::write(path, &e))
-    });
-    // What is left in memory need not be tried again.
-    let (output, _) = writer.into_parts();
-    if let Some(fault) = &output.fault {
-        return Err(FileError::write(path, fault));
-    }
-    written?;
-    drop(output);
-    fs::rename(&temporary, path).map_err(|e| FileError::write(path, &e))?;
-    guard.keep();
-    Ok(())
-}
-
-/// The file that [`write_whole`] fills. It remembers what the system said, which encoders of pictures put into words of their own.
-#[derive(Debug)]
-pub struct Output {
-    file: File,
-    fault: Option<io::Error>,
-}
-
-impl Output {
-    fn noted<T>(&mut self, result: io::Result<T>) -> io::Result<T> {
-        result.map_err(|error| {
-            let kind = error.kind();
-            // An interruption is tried again.
-            if kind != io::ErrorKind::Interrupted {
-                self.fault.get_or_insert(error);
-            }
-            kind.into()
-        })
-    }
-}
-
-impl Write for Output {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = self.file.write(bytes);
-        self.noted(written)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        let flushed = self.file.flush();
-        self.noted(flushed)
-    }
-}
-
-impl Seek for Output {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        let place = self.file.seek(to);
-        self.noted(place)
-    }
+    files::write_whole(path, fill).map_err(|failed| match failed {
+        NotWritten::System(error) => FileError::write(path, &error),
+        NotWritten::Fill(error) => error,
+    })
 }
 
 /// Writes text as a whole file.
@@ -103,65 +49,10 @@ fn folder_of(path: &Path) -> PathBuf {
     }
 }
 
-/// A new file beside `path`, locked while it is written. What processes that were killed left of earlier ones is removed.
-fn create_beside(path: &Path) -> Result<(PathBuf, File), FileError> {
-    static COUNTER: AtomicU64 = AtomicU64::new(0);
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let folder = folder_of(path);
-    remove_left(&folder, &name);
-    loop {
-        let n = COUNTER.fetch_add(1, Ordering::Relaxed);
-        let temporary = folder.join(format!(".{name}.{}-{n}{PART}", std::process::id()));
-        match File::options().write(true).read(true).create_new(true).open(&temporary) {
-            Ok(file) => {
-                let locked = !matches!(file.try_lock(), Err(TryLockError::WouldBlock));
-                // Another process may have taken it for one that was left, in the moment before it was locked.
-                if locked && temporary.exists() {
-                    return Ok((temporary, file));
-                }
-            }
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
-            Err(e) => return Err(FileError::write(path, &e)),
-        }
-    }
-}
-
-/// Removes unfinished files of that name which nobody writes any more: the system frees the lock of a process that ends, however it does.
-fn remove_left(folder: &Path, name: &str) {
-    let Ok(entries) = fs::read_dir(folder) else { return };
-    let (start, own) = (format!(".{name}."), format!(".{name}.{}-", std::process::id()));
-    for entry in entries.flatten() {
-        let file_name = entry.file_name();
-        let file_name = file_name.to_string_lossy();
-        if !file_name.starts_with(&start) || !file_name.ends_with(PART) || file_name.starts_with(&own) {
-            continue;
-        }
-        if File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok()) {
-            // When it cannot be removed it only takes room.
-            let _ = fs::remove_file(entry.path());
-        }
-    }
-}
-
-struct RemoveOnDrop<'a>(Option<&'a Path>);
-
-impl RemoveOnDrop<'_> {
-    fn keep(mut self) {
-        self.0 = None;
-    }
-}
-
-impl Drop for RemoveOnDrop<'_> {
-    fn drop(&mut self) {
-        if let Some(path) = self.0 {
-            // Nothing sensible can be done when this fails too.
-            let _ = fs::remove_file(path);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::{fs, io};
+
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {
@@ -183,19 +74,6 @@ mod tests {
         assert!(failed.is_err());
         assert_eq!(fs::read_to_string(&path).expect("readable"), "old");
         assert_eq!(names(folder.path()), ["x.txt"]);
-    }
-
-    #[test]
-    fn what_a_killed_process_left_goes_and_what_another_one_writes_stays() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let at = |name: &str| folder.path().join(name);
-        for name in [".x.txt.999999999-0.part", ".x.txt.999999998-0.part", ".other.txt.999999999-0.part"] {
-            fs::write(at(name), "half").expect("writable");
-        }
-        let written = File::open(at(".x.txt.999999998-0.part")).expect("readable");
-        written.try_lock().expect("free");
-        write_text(&at("x.txt"), "whole").expect("writable");
-        assert_eq!(names(folder.path()), [".other.txt.999999999-0.part", ".x.txt.999999998-0.part", "x.txt"]);
     }
 
     #[test]
