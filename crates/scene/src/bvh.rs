@@ -1,10 +1,14 @@
-//! A hierarchy of boxes over all triangles of the scene at one time, for shaders that trace rays.
+//! A hierarchy of boxes over all triangles of the scene at one time, for those who trace rays: shaders, and the host ([`Ray`]).
+
+mod rays;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2_from_tris};
 
 use crate::{gpu_data, scene::Scene, state::SceneState};
+
+pub use rays::{Hit, MISSED, Ray};
 
 /// A box and what is in it: two nodes, or some triangles.
 #[repr(C)]

@@ -13,6 +13,7 @@ mod motion;
 #[allow(dead_code, reason = "shared with the tests that cross the crates")]
 mod mutate;
 mod points;
+mod rays;
 mod robustness;
 mod scene_file;
 mod sky;
