@@ -23,7 +23,8 @@
 //! - [`files`]: reading from disk, from the program itself, or from anywhere else.
 //! - [`bounds`]: axis-aligned boxes.
 //! - [`deform`]: meshes whose shape changes, by key frames or as metaballs.
-//! - [`bvh`]: a hierarchy of boxes over all triangles, for shaders that trace rays.
+//! - [`bvh`]: a hierarchy of boxes over all triangles, for who traces rays: shaders, and the host.
+//! - [`measure`]: what a scene is like, measured by rays.
 //!
 //! # Scene files
 //!
@@ -74,6 +75,7 @@ mod fit;
 pub mod gpu_data;
 mod import;
 mod lights;
+pub mod measure;
 pub mod motion;
 pub mod points;
 mod random;
@@ -83,5 +85,6 @@ pub mod state;
 
 pub use deform::{Deformation, Deformed, Metaballs};
 pub use import::{DEFAULT_SHININESS, MAX_TEXTURE_SIZE, Material, Mesh, MeshStatistics, MeshTriangle, Textures};
+pub use measure::{MeasureOptions, Measured, Measures};
 pub use scene::{Light, LightShape, Scene, SceneObject};
 pub use state::SceneState;

@@ -56,6 +56,15 @@ impl<T> Track<T> {
         self.keys.len() > 1
     }
 
+    /// The first and the last time where the value changes between them, and whether the track starts again after that.
+    pub(crate) fn span(&self) -> Option<(f64, f64, bool)>
+    where
+        T: PartialEq,
+    {
+        let changes = self.keys.windows(2).any(|pair| pair[0].1 != pair[1].1);
+        changes.then(|| (self.keys[0].0, self.keys[self.keys.len() - 1].0, self.repeat == Repeat::Loop))
+    }
+
     /// The values before and after a time in seconds, and which share of the way between them it is (0…1, without 1). Where the track stands
     /// still, and on a key, both are the same. A time that is not finite counts as 0.
     pub fn around(&self, time: f64) -> (&T, &T, f32) {

@@ -7,6 +7,7 @@ mod bvh;
 mod deform;
 mod gpu_data;
 mod import;
+mod measure;
 mod memory;
 mod motion;
 #[path = "../../../tests/tests/fuzz/mutate.rs"]

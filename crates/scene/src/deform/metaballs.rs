@@ -92,6 +92,11 @@ impl Metaballs {
         self.balls.iter().any(|ball| ball.keys().windows(2).any(|keys| keys[0].1 != keys[1].1))
     }
 
+    /// The times between which each ball changes, and whether it starts again then.
+    pub(super) fn spans(&self) -> Vec<(f64, f64, bool)> {
+        self.balls.iter().filter_map(Track::span).collect()
+    }
+
     /// A box around all balls over all time, object space.
     pub fn reach(&self) -> Bounds {
         self.reach

@@ -43,6 +43,14 @@ impl Room {
 }
 
 impl Deformation {
+    /// The times between which each part of it changes, and whether it starts again then.
+    pub(crate) fn spans(&self) -> Vec<(f64, f64, bool)> {
+        match self {
+            Self::Keys(shapes) => shapes.span().into_iter().collect(),
+            Self::Metaballs(metaballs) => metaballs.spans(),
+        }
+    }
+
     /// A box around all shapes, object space.
     pub fn reach(&self) -> Bounds {
         match self {

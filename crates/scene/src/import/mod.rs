@@ -12,8 +12,8 @@ pub(crate) use faults::nowhere;
 pub use mesh::{Mesh, MeshStatistics, MeshTriangle};
 pub(crate) use mesh::{area, edges};
 pub(crate) use obj::import_obj;
-pub(crate) use texture::TextureSet;
 pub use texture::{MAX_TEXTURE_SIZE, Textures};
+pub(crate) use texture::{TextureSet, linear_from_srgb};
 
 use glam::Vec3;
 

@@ -112,7 +112,7 @@ fn decode(path: &Path, files: &mut Files<'_>) -> Result<RgbaImage, String> {
 }
 
 /// Radiance-linear value of an sRGB-encoded one.
-fn linear_from_srgb(encoded: f32) -> f32 {
+pub(crate) fn linear_from_srgb(encoded: f32) -> f32 {
     if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 
