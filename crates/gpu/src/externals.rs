@@ -64,7 +64,7 @@ impl Externals {
 
     fn set_bytes(&mut self, gpu: &Gpu, name: &str, desc: ResourceDesc, bytes: &[u8]) -> Result<(), Fault> {
         let size = byte_size(&desc);
-        let fits = self.entries.get(name).and_then(|e| e.memory.buffer()).filter(|b| b.size() == size);
+        let fits = self.entries.get(name).and_then(|e| e.memory.buffer()).filter(|b| b.size() == size && b.usage() == usages(&desc));
         let buffer = match fits {
             Some(buffer) => buffer.clone(),
             None => {
@@ -168,7 +168,12 @@ impl Externals {
 
 fn usages(desc: &ResourceDesc) -> wgpu::BufferUsages {
     use wgpu::BufferUsages as U;
-    let kind = if matches!(desc, ResourceDesc::Uniform { .. }) { U::UNIFORM } else { U::STORAGE };
+    let kind = match desc {
+        ResourceDesc::Uniform { .. } => U::UNIFORM,
+        // It may say how many workgroups run.
+        ResourceDesc::Buffer { element, .. } if matches!(element.as_str(), "vec3u" | "vec4u") => U::STORAGE | U::INDIRECT,
+        _ => U::STORAGE,
+    };
     kind | U::COPY_DST | U::COPY_SRC
 }
 

@@ -20,6 +20,7 @@ use crate::{
     pool::{Memory, Place, Resource, copy},
     record::{compute, draw},
     skip::Skipper,
+    steps::dispatch_size,
     timing::{FrameTimings, Timer},
 };
 
@@ -66,7 +67,14 @@ pub(crate) struct Bindings {
 pub(crate) struct Dispatch {
     pub(crate) pipeline: wgpu::ComputePipeline,
     pub(crate) bindings: Bindings,
-    pub(crate) groups: [u32; 3],
+    pub(crate) groups: DispatchSize,
+}
+
+/// How many workgroups a dispatch has.
+pub(crate) enum DispatchSize {
+    Fixed([u32; 3]),
+    /// What lies at the start of a buffer, of frames of even and odd index.
+    Indirect(Target, [wgpu::Buffer; 2]),
 }
 
 pub(crate) struct Draw {
@@ -405,18 +413,23 @@ pub(crate) fn check_external(externals: &Externals, name: &str, planned: &Resour
 fn rebind(node: &mut Node, planned: &PlanNode, shader: &Shader, finder: Finder<'_>) -> Result<(), (String, String)> {
     let mut steps = planned.steps.iter();
     let Node { own, passes, .. } = node;
-    let all = passes.iter_mut().flat_map(|pass| -> Vec<&mut Bindings> {
+    let all = passes.iter_mut().flat_map(|pass| -> Vec<(&mut Bindings, Option<&mut DispatchSize>)> {
         match pass {
-            Pass::Compute(steps) => steps.iter_mut().map(|s| &mut s.bindings).collect(),
-            Pass::Draw(step) => vec![&mut step.bindings],
+            Pass::Compute(steps) => steps.iter_mut().map(|s| (&mut s.bindings, Some(&mut s.groups))).collect(),
+            Pass::Draw(step) => vec![(&mut step.bindings, None)],
         }
     });
-    for bindings in all {
+    for (bindings, size) in all {
         let mip = bindings.mip.as_ref().map(|(port, level)| (port.as_str(), *level));
         let entry = entry_of(steps.next());
         let groups = |parity| finder.groups(planned, shader, own, &bindings.layout, mip, parity);
         let made = groups(0).and_then(|even| Ok([even, groups(1)?]));
-        bindings.groups = made.map_err(|message| (entry, message))?;
+        bindings.groups = made.map_err(|message| (entry.clone(), message))?;
+        if let Some(size) = size
+            && let DispatchSize::Indirect(target, _) = *size
+        {
+            *size = dispatch_size(finder, target).map_err(|message| (entry, message))?;
+        }
     }
     Ok(())
 }

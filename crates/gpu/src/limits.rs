@@ -1,7 +1,7 @@
 //! Sizes compared with what the device allows, before anything is allocated.
 
 use manylight_graph::{
-    plan::{Lifetime, Plan, PlanNode, PlanResource, PlanStep},
+    plan::{Lifetime, Plan, PlanNode, PlanResource, PlanStep, Workgroups},
     value::ResourceDesc,
 };
 
@@ -111,7 +111,11 @@ fn check_step(limits: &wgpu::Limits, plan: &Plan, node: &PlanNode, step: &PlanSt
                     remedy,
                 });
             }
-            let most = u64::from(groups.iter().copied().max().unwrap_or(0));
+            // What the GPU finds itself is bounded by wgpu: more than the limit runs nothing.
+            let most = match groups {
+                Workgroups::Fixed(groups) => u64::from(groups.iter().copied().max().unwrap_or(0)),
+                Workgroups::Indirect(_) => 0,
+            };
             fail(
                 entry,
                 most,

@@ -53,10 +53,12 @@ impl Shape {
             ResourceDesc::Texture { format, width, height, layers, mips, .. } => Some((format, width, height, layers, mips)),
             _ => None,
         };
-        // Buffers have all usages at once, and every texture can be read.
+        // Buffers have all usages but one at once, and every texture can be read.
         let usage = match texture {
-            Some((format, ..)) => Usage { read: true, storage: usage.storage, target: usage.target || format == Format::Depth32Float },
-            None => Usage::default(),
+            Some((format, ..)) => {
+                Usage { read: true, storage: usage.storage, target: usage.target || format == Format::Depth32Float, indirect: false }
+            }
+            None => Usage { indirect: usage.indirect, ..Usage::default() },
         };
         Self { texture, bytes: byte_size(desc), usage }
     }
@@ -181,6 +183,7 @@ fn slot_usage(plan: &Plan, usage: &[Usage], host_outputs: &[bool]) -> Vec<Usage>
             all.read |= usage[ix].read;
             all.storage |= usage[ix].storage;
             all.target |= usage[ix].target;
+            all.indirect |= usage[ix].indirect;
         }
     }
     slots
@@ -276,7 +279,7 @@ fn make(gpu: &Gpu, label: &str, desc: &ResourceDesc, shape: Shape) -> Result<All
         ResourceDesc::Buffer { .. } | ResourceDesc::Uniform { .. } => Memory::Buffer(gpu.device().create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
             size: shape.bytes,
-            usage: buffer_usages(),
+            usage: buffer_usages(shape.usage),
             mapped_at_creation: false,
         })),
     });
@@ -322,9 +325,10 @@ fn texture_usages(format: Format, usage: Usage) -> wgpu::TextureUsages {
     all
 }
 
-fn buffer_usages() -> wgpu::BufferUsages {
+fn buffer_usages(usage: Usage) -> wgpu::BufferUsages {
     use wgpu::BufferUsages as U;
-    U::STORAGE | U::COPY_SRC | U::COPY_DST
+    let indirect = if usage.indirect { U::INDIRECT } else { U::empty() };
+    U::STORAGE | U::COPY_SRC | U::COPY_DST | indirect
 }
 
 /// A zeroed stand-in for a port that is connected to nothing.

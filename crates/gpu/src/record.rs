@@ -1,6 +1,6 @@
 //! The commands of a compute pass and of a draw. Nothing here allocates.
 
-use crate::frame::{Dispatch, Draw};
+use crate::frame::{Dispatch, DispatchSize, Draw};
 
 /// Colour targets that WebGPU allows at most.
 pub(crate) const MOST_TARGETS: usize = 8;
@@ -28,8 +28,10 @@ pub(crate) fn compute(encoder: &mut wgpu::CommandEncoder, label: &str, steps: &[
                 pass.set_bind_group(*index, group, &[]);
             }
         }
-        let [x, y, z] = step.groups;
-        pass.dispatch_workgroups(x, y, z);
+        match &step.groups {
+            DispatchSize::Fixed([x, y, z]) => pass.dispatch_workgroups(*x, *y, *z),
+            DispatchSize::Indirect(_, buffers) => pass.dispatch_workgroups_indirect(&buffers[parity], 0),
+        }
         before = Some(step);
     }
 }

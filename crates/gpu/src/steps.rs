@@ -1,7 +1,7 @@
 //! A step's pipeline, and the pass that runs it.
 
 use manylight_graph::{
-    plan::{Plan, PlanNode, PlanStep, ResourceIx, Target},
+    plan::{Plan, PlanNode, PlanStep, ResourceIx, Target, Workgroups},
     shader::Shader,
     value::{Format, ResourceDesc},
 };
@@ -11,7 +11,7 @@ use crate::{
     device::Gpu,
     error::Fault,
     format::texture_format,
-    frame::{Bindings, Dispatch, Draw, Pass, entry_of},
+    frame::{Bindings, Dispatch, DispatchSize, Draw, Pass, entry_of},
     params,
     pipeline_cache::{ComputeKey, Constants, PipelineCache, Refused, RenderKey},
     pool::Memory,
@@ -96,6 +96,16 @@ fn color_formats(gpu: &Gpu, plan: &Plan, targets: &[ResourceIx]) -> Result<Vec<w
     targets.iter().map(format_of).collect()
 }
 
+/// The number of workgroups that lies in a buffer.
+pub(crate) fn dispatch_size(finder: Finder<'_>, target: Target) -> Result<DispatchSize, String> {
+    let of = |parity| match finder.memory(target, parity)? {
+        Memory::Buffer(buffer) if buffer.usage().contains(wgpu::BufferUsages::INDIRECT) => Ok(buffer.clone()),
+        Memory::Buffer(_) => Err("the buffer that says how many workgroups run was made without the usage INDIRECT".to_owned()),
+        Memory::Texture(_) => Err("a texture cannot say how many workgroups run".to_owned()),
+    };
+    Ok(DispatchSize::Indirect(target, [of(0)?, of(1)?]))
+}
+
 /// A pass of one step; `cleared` tells which targets an earlier draw of the node has already cleared.
 pub(crate) fn pass(
     finder: Finder<'_>,
@@ -106,7 +116,11 @@ pub(crate) fn pass(
 ) -> Result<Pass, String> {
     match (step, pipeline) {
         (PlanStep::Compute { groups, .. }, Pipeline::Compute(pipeline)) => {
-            Ok(Pass::Compute(vec![Dispatch { pipeline, bindings, groups: *groups }]))
+            let groups = match groups {
+                Workgroups::Fixed(groups) => DispatchSize::Fixed(*groups),
+                Workgroups::Indirect(target) => dispatch_size(finder, *target)?,
+            };
+            Ok(Pass::Compute(vec![Dispatch { pipeline, bindings, groups }]))
         }
         (PlanStep::Draw { vertices, instances, targets, depth, .. }, Pipeline::Render(pipeline)) => {
             let mut attach = |ix: ResourceIx| {

@@ -2,7 +2,7 @@
 
 use manylight_gpu::{BuildError, Fault, Frame};
 use manylight_graph::{
-    plan::{Plan, PlanStep, Target},
+    plan::{Plan, PlanStep, Target, Workgroups},
     value::ResourceDesc,
 };
 
@@ -134,7 +134,7 @@ fn dispatches_beyond_the_limits_name_the_node() {
     let most = world.gpu.limits().max_compute_workgroups_per_dimension;
     let mut plan = world.plan();
     let work = plan.nodes.iter_mut().find(|n| n.id == "work").unwrap();
-    if let PlanStep::Compute { groups, .. } = &mut work.steps[0] {
+    if let PlanStep::Compute { groups: Workgroups::Fixed(groups), .. } = &mut work.steps[0] {
         groups[1] = most + 1;
     }
     let error = build_error(&world, &plan).to_string();

@@ -7,6 +7,7 @@ mod failures;
 mod formats;
 mod history;
 mod host;
+mod indirect;
 mod mips;
 mod numbers;
 mod params;

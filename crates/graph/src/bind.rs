@@ -6,7 +6,7 @@ use crate::{
     declaration::Declaration,
     diagnostics::{Diagnostic, Source, Span},
     reflect::NEAREST_SAMPLER,
-    registry::{Direction, Port, Repeat, Step},
+    registry::{Direction, Over, Port, Repeat, Step},
     render::{and_also, suggest},
     shader::{Access, Global, GlobalKind, SampleKind, Shader},
     wgsl::Scan,
@@ -133,13 +133,22 @@ impl<'a> Binder<'a> {
         })
     }
 
+    /// Whether a step gets its number of workgroups from the port.
+    fn sizes_a_step(&self, name: &str) -> bool {
+        self.decl.steps.iter().any(|s| matches!(s, Step::Compute { over: Over::Indirect(port), .. } if port == name))
+    }
+
     /// Every port must be used, and outputs must be written.
     fn ports(&mut self, reached: &Option<BTreeSet<String>>) {
         for (name, port) in &self.decl.ports {
             if self.drawn(name) {
                 continue;
             }
+            let sizes_a_step = self.sizes_a_step(name);
             let Some(index) = self.shader.globals.iter().position(|g| g.name == *name) else {
+                if sizes_a_step && port.direction == Direction::Input {
+                    continue;
+                }
                 // A misspelt global is already reported with this port as the suggestion.
                 let candidates = self.shader.globals.iter().filter(|g| !self.known_global(&g.name)).map(|g| g.name.as_str());
                 if crate::render::nearest(name, candidates).is_some() {
@@ -156,7 +165,7 @@ impl<'a> Binder<'a> {
                 continue;
             };
             let Some(reached) = reached else { continue };
-            let mut used = false;
+            let mut used = sizes_a_step;
             let mut access = Access::default();
             for entry in self.shader.entries.iter().filter(|e| reached.contains(&e.name)) {
                 for (_, one) in entry.uses.iter().filter(|(g, _)| *g == index) {

@@ -301,6 +301,24 @@ fn port_of_kind(reader: &mut Reader, name: &Spanned, names: &Names<'_>, texture:
     None
 }
 
+/// Elements of a buffer that says how many workgroups run; a fourth number is the node's own.
+const WORKGROUPS: [&str; 2] = ["vec3u", "vec4u"];
+
+fn indirect_port(reader: &mut Reader, name: &Spanned, names: &Names<'_>) -> Option<String> {
+    let port = find_port(reader, name, names)?;
+    if matches!(&port.kind, PortKind::Buffer { of } if WORKGROUPS.contains(&of.as_str())) {
+        return Some(name.text.clone());
+    }
+    let span = port.span.clone();
+    let what = crate::fit::describe(&port.kind);
+    reader.out.push(
+        Diagnostic::error(format!("`{}` cannot say how many workgroups run: it is {what}", name.text), name.span.clone())
+            .and(span, "declared here")
+            .help("declare it as Buffer(of: \"vec4u\", …): workgroups in x, y and z; the fourth number is the node's own"),
+    );
+    None
+}
+
 fn read_expr(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Expr> {
     let ExprAt { expr, refs, .. } = expr::read(reader, tree)?;
     let mut good = true;
@@ -333,12 +351,16 @@ fn read_expr(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Expr
 }
 
 fn read_over(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Over> {
-    const FORMS: [&str; 4] = ["Texels", "Elements", "Threads", "Groups"];
+    const FORMS: [&str; 5] = ["Texels", "Elements", "Threads", "Groups", "Indirect"];
     let Kind::Tuple(Some(name), items) = &tree.kind else {
-        reader.expected(tree, "Texels(\"port\"), Elements(\"port\"), Threads(x, y, z) or Groups(x, y, z)", "");
+        reader.expected(tree, "Texels(\"port\"), Elements(\"port\"), Threads(x, y, z), Groups(x, y, z) or Indirect(\"port\")", "");
         return None;
     };
     match (name.text.as_str(), items.as_slice()) {
+        ("Indirect", [item]) => {
+            let port = reader.text(item, "the name of a port in quotes")?;
+            indirect_port(reader, &port, names).map(Over::Indirect)
+        }
         (form @ ("Texels" | "Elements"), [item]) => {
             let port = reader.text(item, "the name of a port in quotes")?;
             let port = port_of_kind(reader, &port, names, form == "Texels")?;
@@ -349,7 +371,7 @@ fn read_over(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Over
             Some(if form == "Threads" { Over::Threads(x?, y?, z?) } else { Over::Groups(x?, y?, z?) })
         }
         (form, _) if FORMS.contains(&form) => {
-            let usage = if matches!(form, "Texels" | "Elements") {
+            let usage = if matches!(form, "Texels" | "Elements" | "Indirect") {
                 format!("write `{form}(\"port\")`")
             } else {
                 format!("write `{form}(x, y, z)`")

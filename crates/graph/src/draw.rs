@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fmt::Write as _};
 use serde_json::{Value as Json, json};
 
 use crate::{
-    plan::{Idle, Lifetime, Plan, PlanStep, Target},
+    plan::{Idle, Lifetime, Plan, PlanStep, Target, Workgroups},
     registry::Direction,
     value::Value,
 };
@@ -115,18 +115,20 @@ impl Plan {
     /// The whole plan as JSON.
     pub fn to_json(&self) -> Json {
         let name = |ix: usize| self.resources[ix].name.as_str();
+        let target = |target: &Target| match target {
+            Target::Resource(ix) => json!(name(*ix)),
+            Target::Previous(ix) => json!({ "previous": name(*ix) }),
+            Target::Absent => Json::Null,
+        };
         let values = |list: &[(String, Value)]| Json::Object(list.iter().map(|(n, v)| (n.clone(), value(v))).collect());
         let nodes = self.nodes.iter().map(|node| {
-            let bindings = node.bindings.iter().map(|(port, target)| {
-                let target = match target {
-                    Target::Resource(ix) => json!(name(*ix)),
-                    Target::Previous(ix) => json!({ "previous": name(*ix) }),
-                    Target::Absent => Json::Null,
-                };
-                (port.clone(), target)
-            });
+            let bindings = node.bindings.iter().map(|(port, bound)| (port.clone(), target(bound)));
             let steps = node.steps.iter().map(|step| match step {
                 PlanStep::Compute { entry, groups, mip } => {
+                    let groups = match groups {
+                        Workgroups::Fixed(groups) => json!(groups),
+                        Workgroups::Indirect(bound) => json!({ "indirect": target(bound) }),
+                    };
                     json!({ "entry": entry, "groups": groups, "mip": mip.as_ref().map(|(port, level)| json!({ "port": port, "level": level })) })
                 }
                 PlanStep::Draw { vertex, fragment, vertices, instances, targets, depth } => json!({

@@ -77,6 +77,8 @@ pub struct Usage {
     pub storage: bool,
     /// Colour or depth attachment.
     pub target: bool,
+    /// Says how many workgroups a dispatch has.
+    pub indirect: bool,
 }
 
 /// A resource with its size.
@@ -105,6 +107,15 @@ pub enum Target {
     Absent,
 }
 
+/// How many workgroups a dispatch has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Workgroups {
+    /// So many in x, y and z.
+    Fixed([u32; 3]),
+    /// What the first three numbers of a buffer say when the dispatch comes to run.
+    Indirect(Target),
+}
+
 /// A dispatch or draw with its size.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum PlanStep {
@@ -113,7 +124,7 @@ pub enum PlanStep {
         /// Entry point.
         entry: String,
         /// Workgroups.
-        groups: [u32; 3],
+        groups: Workgroups,
         /// For a step repeated over mips: the port and the level it writes. Such steps are already unrolled.
         mip: Option<(String, u32)>,
     },
@@ -153,6 +164,16 @@ pub struct PlanNode {
     pub because: Option<String>,
     /// Frames after which it stops, when nothing but the frame's number and its own history changed; its outputs stay.
     pub settles: Option<u32>,
+}
+
+impl PlanStep {
+    /// The buffer that says how many workgroups it has, if one does.
+    pub fn indirect(&self) -> Option<ResourceIx> {
+        match self {
+            Self::Compute { groups: Workgroups::Indirect(Target::Resource(ix) | Target::Previous(ix)), .. } => Some(*ix),
+            _ => None,
+        }
+    }
 }
 
 impl PlanNode {

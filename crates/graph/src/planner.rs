@@ -9,7 +9,7 @@ use crate::{
     facts::{Facts, Seen, Verdict},
     order::{self, Dag},
     pipeline::Pipeline,
-    plan::{Idle, IdleNode, Lifetime, Plan, PlanInput, PlanNode, PlanResource, Target, Usage},
+    plan::{Idle, IdleNode, Lifetime, Plan, PlanInput, PlanNode, PlanResource, PlanStep, Target, Usage},
     refuse,
     registry::{Direction, Registry, Step},
     resolve::{Linked, Wire, link},
@@ -199,7 +199,7 @@ impl<'a, 'p> Planner<'a, 'p> {
                         resource.usage.read |= matches!(resource.desc, crate::value::ResourceDesc::Texture { mips, .. } if mips > 1);
                     }
                 }
-                ports.insert(port_name, (ix, resource.desc.clone()));
+                ports.insert(port_name, (target, resource.desc.clone()));
             }
             bindings.push((port_name.to_owned(), target));
         }
@@ -209,6 +209,7 @@ impl<'a, 'p> Planner<'a, 'p> {
         let decl = std::sync::Arc::clone(linked.decl?);
         let scope = NodeScope { decl: &decl, ports, params: &params, output: self.input.output };
         let steps = steps::unroll(&id, &scope, self.out);
+        steps.iter().filter_map(PlanStep::indirect).for_each(|ix| table.resources[ix].usage.indirect = true);
         let frames = decl.settles.as_ref().and_then(|name| scope.param(name)).filter(|frames| *frames > 0);
         let settles = frames.and_then(|frames| u32::try_from(frames).ok());
         let because = activity.verdicts[index].as_ref().map(Verdict::why);

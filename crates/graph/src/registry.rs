@@ -109,6 +109,8 @@ pub enum Over {
     Threads(Expr, Expr, Expr),
     /// Workgroups in x, y, z.
     Groups(Expr, Expr, Expr),
+    /// As many workgroups as the first three numbers of the port's buffer say when the step comes to run: a number that the GPU found itself.
+    Indirect(String),
 }
 
 /// Runs a step once a mip level.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::{
     diagnostics::Diagnostic,
     expr::{self, EvalError, Scope},
-    plan::{PlanStep, ResourceIx},
+    plan::{PlanStep, Target, Workgroups},
     registry::{Expr, NodeDecl, Over, Repeat, Step},
     shader::Stage,
     value::{ResourceDesc, Value},
@@ -19,8 +19,8 @@ const MOST_REPEATS: u64 = 4096;
 /// What steps are sized by: the node's ports and parameters.
 pub(crate) struct NodeScope<'a> {
     pub decl: &'a NodeDecl,
-    /// Resource and description at each connected port.
-    pub ports: BTreeMap<&'a str, (ResourceIx, ResourceDesc)>,
+    /// What is connected to each port, with its description.
+    pub ports: BTreeMap<&'a str, (Target, ResourceDesc)>,
     pub params: &'a [(String, Value)],
     pub output: (u32, u32),
 }
@@ -111,10 +111,15 @@ fn unroll_step(step: &Step, scope: &NodeScope<'_>, steps: &mut Vec<PlanStep>) ->
     match step {
         Step::Compute { entry, over, repeat, .. } => {
             let mut push = |level: u32, mip: Option<(String, u32)>| {
-                let groups = groups(scope, entry, over, mip.as_ref().map(|(port, _)| port.as_str()), level)?;
-                if !groups.contains(&0) {
-                    steps.push(PlanStep::Compute { entry: entry.clone(), groups, mip });
-                }
+                let groups = match over {
+                    // Without a buffer there is no work.
+                    Over::Indirect(port) => scope.ports.get(port.as_str()).map(|(target, _)| Workgroups::Indirect(*target)),
+                    _ => {
+                        let groups = groups(scope, entry, over, mip.as_ref().map(|(port, _)| port.as_str()), level)?;
+                        (!groups.contains(&0)).then_some(Workgroups::Fixed(groups))
+                    }
+                };
+                steps.extend(groups.map(|groups| PlanStep::Compute { entry: entry.clone(), groups, mip }));
                 Ok::<(), StepError>(())
             };
             let levels = |port: &str| match scope.ports.get(port) {
@@ -147,7 +152,10 @@ fn unroll_step(step: &Step, scope: &NodeScope<'_>, steps: &mut Vec<PlanStep>) ->
             {
                 return Err(StepError::Targets([first, other]));
             }
-            let resource = |port: &String| scope.ports.get(port.as_str()).map(|(ix, _)| *ix);
+            let resource = |port: &String| match scope.ports.get(port.as_str()) {
+                Some((Target::Resource(ix), _)) => Some(*ix),
+                _ => None,
+            };
             let targets = targets.iter().filter_map(resource).collect();
             let depth = depth.as_ref().and_then(resource);
             steps.push(PlanStep::Draw { vertex: vertex.clone(), fragment: fragment.clone(), vertices, instances, targets, depth });
@@ -174,6 +182,7 @@ fn groups(scope: &NodeScope<'_>, entry: &str, over: &Over, mip_port: Option<&str
             [x.div_ceil(size[0]), y.div_ceil(size[1]), z.div_ceil(size[2])]
         }
         Over::Groups(x, y, z) => triple(scope, x, y, z)?,
+        Over::Indirect(_) => [0; 3],
     };
     if wanted.iter().any(|n| *n > MOST_GROUPS) {
         return Err(StepError::Groups(wanted));

@@ -6,7 +6,7 @@ use super::{Binder, kind_word, within, within_field};
 use crate::{
     diagnostics::{Diagnostic, Span},
     reflect,
-    registry::{Over, PortKind, Step},
+    registry::{Direction, Over, PortKind, Step},
     render::suggest,
     shader::{Entry, Stage},
 };
@@ -16,7 +16,7 @@ impl Binder<'_> {
     pub(super) fn steps(&mut self) -> Option<BTreeSet<String>> {
         let mut reached = BTreeSet::new();
         let mut complete = true;
-        for step in &self.decl.steps {
+        for (index, step) in self.decl.steps.iter().enumerate() {
             match step {
                 Step::Compute { entry: name, over, span, .. } => match self.entry(name, Stage::Compute, span) {
                     Some(entry) => {
@@ -29,6 +29,9 @@ impl Binder<'_> {
                                     .and(place, format!("its workgroup has the size {x}×{y}×{z}"))
                                     .help("write `@workgroup_size(64)`, or give the step another size"),
                             );
+                        }
+                        if let Over::Indirect(port) = over {
+                            self.indirect(index, &entry, port, span);
                         }
                     }
                     None => complete = false,
@@ -57,6 +60,31 @@ impl Binder<'_> {
             }
         }
         complete.then_some(reached)
+    }
+
+    /// The number of workgroups in an output of the node itself: written before, and not in the same dispatch.
+    fn indirect(&mut self, index: usize, entry: &Entry, port: &str, span: &Span) {
+        if self.decl.ports.get(port).is_none_or(|p| p.direction == Direction::Input) {
+            return;
+        }
+        let Some(global) = self.shader.globals.iter().position(|g| g.name == port) else { return };
+        let place = within_field(span, "over", &format!("\"{port}\""));
+        if entry.uses.iter().any(|(used, _)| *used == global) {
+            let there = self.item_span("fn", &entry.name);
+            let fault = Diagnostic::error(format!("`{}` uses `{port}`, which says how often it runs", entry.name), place);
+            let help = "a dispatch cannot write what it is sized by; copy what it needs of it to another output in an earlier step";
+            self.out.push(fault.and(there, "a global of an output may be written").help(help));
+            return;
+        }
+        let writes = |step: &Step| {
+            let Step::Compute { entry, .. } = step else { return false };
+            let entry = self.shader.entries.iter().find(|e| e.name == *entry);
+            entry.is_some_and(|e| e.uses.iter().any(|(used, access)| *used == global && access.write))
+        };
+        if !self.decl.steps[..index].iter().any(writes) {
+            let fault = Diagnostic::error(format!("no step before this one writes `{port}`"), place);
+            self.out.push(fault.help("move the step behind the one that writes it, or make it an input"));
+        }
     }
 
     pub(super) fn entry(&mut self, name: &str, stage: Stage, span: &Span) -> Option<Entry> {

@@ -4,6 +4,7 @@
 mod conditions;
 mod drawing;
 mod good;
+mod indirect;
 mod invariants;
 mod kit;
 mod merging;

@@ -1,7 +1,7 @@
 //! Plans: order, values, sizes, lives, switches.
 
 use manylight_graph::{
-    plan::{Debug, Idle, Lifetime, Plan, PlanInput, PlanStep, Target},
+    plan::{Debug, Idle, Lifetime, Plan, PlanInput, PlanStep, Target, Workgroups},
     registry::{External, HostDecl, PortKind},
     value::{ResourceDesc, Value},
 };
@@ -155,7 +155,7 @@ fn an_optional_input_whose_producer_is_off_is_absent() {
 fn many_elements_fold_into_rows() {
     let files = with(FILE, "\"count\": Int(min: 1, max: 4096", "\"count\": Int(min: 1, max: 4000000");
     let plan = try_plan(&files, &set(&[("count", "3000000")])).unwrap();
-    assert_eq!(plan.nodes[0].steps[0], PlanStep::Compute { entry: "clear".into(), groups: [65535, 2, 1], mip: None });
+    assert_eq!(plan.nodes[0].steps[0], PlanStep::Compute { entry: "clear".into(), groups: Workgroups::Fixed([65535, 2, 1]), mip: None });
 }
 
 #[test]
