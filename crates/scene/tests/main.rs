@@ -19,4 +19,7 @@ mod robustness;
 mod scene_file;
 mod sky;
 mod state;
+#[path = "../../../tests/tests/support.rs"]
+#[allow(dead_code, reason = "shared with the tests that cross the crates")]
+mod support;
 mod textures;

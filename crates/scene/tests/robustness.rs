@@ -11,7 +11,8 @@ use proptest::prelude::*;
 
 use crate::{
     memory::{load, obj},
-    mutate::{Random, fuzz, ron, times},
+    mutate::{fuzz, ron, times},
+    support::Random,
 };
 
 const OBJ: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0 1\nv 0 1 0 1 0 0\nv 0 0 1\nvt 0 0\nvt 1\nvn 0 0 1\nusemtl a\nf 1/1/1 2/2/1 3/1/1\ng x\nusemtl b c\nf 1//1 2//1 4//1\nf -1 -2 -3 -4\nl 1 2\np 1\n";
