@@ -26,6 +26,8 @@ const MAX_BOUNCES: u32 = 32;
 const SHARED: u32 = 4;
 /// Survival of a path is never likelier than this, so that a white scene's paths end.
 const MOST_SURVIVAL: f32 = 0.95;
+/// Lights that shadow rays of one point go to; of more, so many are chosen, evenly over their list.
+const MOST_LIGHTS: usize = 8;
 /// What densities are divided by at least.
 const LEAST_DENSITY: f32 = 1e-30;
 
@@ -72,7 +74,7 @@ fn sum(rgb: Vec3) -> f64 {
     rgb.as_dvec3().element_sum()
 }
 
-impl Walk<'_> {
+impl<'a> Walk<'a> {
     /// A texel of the reflective shadow map: does it reflect light?
     fn texel(&mut self, index: u32) {
         let views = &self.world.views;
@@ -173,12 +175,22 @@ impl Walk<'_> {
         self.sums.add(Quantity::Matt, sum(total.matt));
     }
 
+    /// Lights for shadow rays, and how many each of them stands for: each light is as likely.
+    fn some_lights(&mut self) -> (f32, impl Iterator<Item = &'a Light> + use<'a>) {
+        let lights = &self.world.lights;
+        let step = (lights.len() as f32 / MOST_LIGHTS as f32).max(1.0);
+        let first = if step > 1.0 { self.random.one() * step } else { 0.0 };
+        let chosen = (0..lights.len().min(MOST_LIGHTS)).map(move |i| (first + i as f32 * step) as usize);
+        (step, chosen.filter_map(|index| lights.get(index)))
+    }
+
     /// Radiance that a surface sends to its viewer of the lights themselves.
-    fn direct(&self, x: &Surface) -> Bounced {
+    fn direct(&mut self, x: &Surface) -> Bounced {
         let mut out = Bounced::ZERO;
-        for light in &self.world.lights {
+        let (each, lights) = self.some_lights();
+        for light in lights {
             let arrival = arrival(light, x.position);
-            let radiance = x.reflected(&arrival);
+            let radiance = x.reflected(&arrival) * each;
             if !radiance.is_dark() {
                 out.sent += radiance;
                 if self.is_lit(x, light, &arrival) {
@@ -246,12 +258,13 @@ impl Walk<'_> {
 
     /// Radiance that `y`, which a cosine-distributed direction from `x` met, sends to `x` of the lights themselves. What one of `joined` rays from
     /// lights could have found counts less.
-    fn weighted_direct(&self, x: &Surface, y: &Surface, joined: u32) -> Both {
+    fn weighted_direct(&mut self, x: &Surface, y: &Surface, joined: u32) -> Both {
         let own = x.coupling(y) / PI;
         let mut radiance = Both::ZERO;
-        for light in &self.world.lights {
+        let (each, lights) = self.some_lights();
+        for light in lights {
             let arrival = arrival(light, y.position);
-            let reflected = y.reflected(&arrival);
+            let reflected = y.reflected(&arrival) * each;
             if !reflected.is_dark() && self.is_lit(y, light, &arrival) {
                 radiance += reflected * (own / (own + joined as f32 * y.pdf_light(&arrival)).max(LEAST_DENSITY));
             }
