@@ -104,7 +104,7 @@ impl<'a> Subject<'a> {
 
     /// The plan; nothing where it is refused with a reason; else the faults.
     pub fn plan(&self, settings: &Settings, scene: &Scene) -> Result<Option<Plan>, String> {
-        let input = plan_input(settings, scene);
+        let input = plan_input(self.documents.pipeline(), settings, scene);
         let faults = match self.documents.plan(&input) {
             Ok(plan) => return Ok(Some(plan)),
             Err(faults) => faults,

@@ -61,12 +61,12 @@ pub const MEASURED: &[MeasuredFeature] = &[
     },
     MeasuredFeature {
         name: "specular_energy",
-        doc: "share of all the light that the picture shows that comes by way of a specular lobe",
+        doc: "share of all the light of lights that the picture shows that comes by way of a specular lobe",
         most: 1.0,
     },
     MeasuredFeature {
         name: "unseen_light",
-        doc: "share of the flux that lit surfaces reflect that reaches nothing of what the camera sees",
+        doc: "share of the flux that lit surfaces reflect that reaches nothing of what the camera sees, or leaves the scene",
         most: 1.0,
     },
     MeasuredFeature {
@@ -102,7 +102,7 @@ impl Measured {
     }
 
     /// What the feature is not above, as far as the error lets one say.
-    pub(crate) fn at_most(&self) -> f64 {
+    pub fn at_most(&self) -> f64 {
         self.value + SURE * self.standard_error
     }
 }

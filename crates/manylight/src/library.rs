@@ -6,6 +6,7 @@ use std::{
     sync::Arc,
 };
 
+use etcetera::BaseStrategy;
 use include_dir::{Dir, include_dir};
 use manylight_graph::{
     diagnostics::Source,
@@ -62,22 +63,28 @@ fn is_root(folder: &Path) -> bool {
     folder.join("shaders").is_dir() && folder.join("pipelines").is_dir()
 }
 
-/// A scene by path (`rooms/hall.ron`, `mesh.obj`) or by name in `assets/` (`cornell`), on disk or embedded.
+/// The folder of this name among what the program keeps for the user, if the system has a place for that.
+pub fn cache(name: &str) -> Option<PathBuf> {
+    etcetera::choose_base_strategy().ok().map(|strategy| strategy.cache_dir().join("manylight").join(name))
+}
+
+/// A scene by path (`rooms/hall.ron`, `mesh.obj`) or by name in `assets/` (`cornell`), on disk or embedded. What is measured of it is kept in the user's
+/// cache.
 ///
 /// # Errors
 /// There is no such scene; the nearest name is told.
 pub fn scene(library: &Library, name: &str) -> Result<SceneSource, Fault> {
     if Path::new(name).is_file() {
-        return Ok(SceneSource::file(name));
+        return Ok(SceneSource::file(name).keeping_measures_in(cache("measures")));
     }
     let plain = name.replace('\\', "/");
     let built_in = embedded("assets", &ASSETS);
     for path in [plain.clone(), format!("assets/{plain}"), format!("assets/{plain}.ron"), format!("assets/{plain}.obj")] {
         if let Some(file) = library.root().map(|root| root.join(&path)).filter(|file| file.is_file()) {
-            return Ok(SceneSource::file(file));
+            return Ok(SceneSource::file(file).keeping_measures_in(cache("measures")));
         }
         if built_in.iter().any(|(known, _)| *known == path) {
-            return Ok(SceneSource::embedded(path, built_in));
+            return Ok(SceneSource::embedded(path, built_in).keeping_measures_in(cache("measures")));
         }
     }
     if Path::new(name).is_dir() {

@@ -31,7 +31,7 @@ fn main() -> Outcome<()> {
     let settings =
         |size, rsm: u32| Settings { size: (size, size), set: vec![("rsm_size".to_owned(), rsm.to_string())], ..Settings::default() };
     let documents = Documents::load(library(), Path::new("acrsm"))?;
-    let input = plan_input(&settings(256, 256), &scene.load()?);
+    let input = plan_input(documents.pipeline(), &settings(256, 256), &scene.load()?);
     let mut plans = Vec::new();
     for _ in 0..PLANS {
         let start = Instant::now();

@@ -203,13 +203,17 @@ fn check_baked(plan: &Plan, settings: &Settings, scene: &Scene) -> Result<(), Di
 /// By so much the proportions of a picture may differ from those that light was baked for: rounding of sides.
 const ASPECT_TOLERANCE: f64 = 0.02;
 
-/// What a plan depends on besides pipeline and nodes; needs no GPU.
-pub fn plan_input(settings: &Settings, scene: &Scene) -> PlanInput {
+/// What a plan of a pipeline depends on besides its documents; needs no GPU. Where the pipeline asks for something that is measured of scenes, the
+/// scene is measured now if it has not been before, which takes some tenths of a second ([`Scene::measured`]).
+pub fn plan_input(pipeline: &Pipeline, settings: &Settings, scene: &Scene) -> PlanInput {
+    let (width, height) = settings.size;
+    let is_asked = !pipeline.measured_features().is_empty() && width > 0 && height > 0;
+    let measured = if is_asked { scene.measured(width as f32 / height as f32).features.clone() } else { BTreeMap::new() };
     PlanInput {
         output: settings.size,
         set: settings.set.clone(),
         features: features(settings, scene),
-        measured: BTreeMap::new(),
+        measured,
         externals: descriptions(scene, settings.baked.as_deref()),
         keep: settings.keep.clone(),
         keep_unchanged: settings.skip_unchanged,
@@ -248,7 +252,7 @@ impl Renderer {
     pub fn with(gpu: &Gpu, documents: Documents, source: SceneSource, scene: Scene, settings: Settings) -> Result<Self, RenderError> {
         let hosts = host::nodes();
         let mut scene = LoadedScene::new(source, scene, &settings, 0.0);
-        let plan = documents.plan(&plan_input(&settings, &scene.host.scene))?;
+        let plan = documents.plan(&plan_input(documents.pipeline(), &settings, &scene.host.scene))?;
         check_baked(&plan, &settings, &scene.host.scene)?;
         scene.upload(gpu, settings.size, &gpu_data::Frame { seed: settings.seed, ..Default::default() })?;
         let (frame, _) = build(gpu, &plan, &scene, &hosts, None, &settings)?;
@@ -460,7 +464,7 @@ impl Renderer {
         let scene = scene.or_else(|| baked_changed.then(|| Scene::clone(&self.scene.host.scene)));
         let mut new_scene = scene.map(|scene| LoadedScene::new(self.scene.source.clone(), scene, new_settings, time.into()));
         let described = new_scene.as_ref().map_or(&self.scene.host.scene, |s| &s.host.scene);
-        let plan = new_documents.plan(&plan_input(new_settings, described))?;
+        let plan = new_documents.plan(&plan_input(new_documents.pipeline(), new_settings, described))?;
         check_baked(&plan, new_settings, described)?;
         if let Some(scene) = &mut new_scene {
             let frame = gpu_data::Frame { seed: new_settings.seed, time, ..Default::default() };

@@ -10,17 +10,24 @@ use manylight_scene::{Scene, files::Embedded};
 pub struct SceneSource {
     path: PathBuf,
     embedded: Embedded,
+    measures: Option<PathBuf>,
 }
 
 impl SceneSource {
     /// A `.ron` or `.obj` file on disk.
     pub fn file(path: impl Into<PathBuf>) -> Self {
-        Self { path: path.into(), embedded: Embedded::default() }
+        Self { path: path.into(), ..Self::default() }
     }
 
     /// A path among files in the program (`assets/cornell.ron`); files on disk at the same paths win.
     pub fn embedded(path: impl Into<PathBuf>, files: Vec<(String, &'static [u8])>) -> Self {
-        Self { path: path.into(), embedded: Embedded(files) }
+        Self { path: path.into(), embedded: Embedded(files), measures: None }
+    }
+
+    /// With a folder in which what is measured of the scene is kept ([`Scene::keep_measures_in`]).
+    #[must_use]
+    pub fn keeping_measures_in(self, folder: Option<PathBuf>) -> Self {
+        Self { measures: folder, ..self }
     }
 
     /// The path.
@@ -33,6 +40,10 @@ impl SceneSource {
     /// # Errors
     /// The scene's faults; what was mended is in [`Scene::warnings`].
     pub fn load(&self) -> Result<Scene, Diagnostics> {
-        Scene::load_with(&self.path, &self.embedded)
+        let mut scene = Scene::load_with(&self.path, &self.embedded)?;
+        if let Some(folder) = &self.measures {
+            scene.keep_measures_in(folder.clone());
+        }
+        Ok(scene)
     }
 }

@@ -77,6 +77,14 @@ pub(crate) fn without_dots(path: &Path) -> PathBuf {
     path.components().filter(|component| *component != Component::CurDir).collect()
 }
 
+/// Where FNV-1a of 64 bits starts.
+pub(crate) const FNV_START: u64 = 0xcbf2_9ce4_8422_2325;
+
+/// FNV-1a of 64 bits, gone on with.
+pub(crate) fn fnv(hash: u64, bytes: &[u8]) -> u64 {
+    bytes.iter().fold(hash, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
 /// Reads files, and remembers which and a hash of their contents.
 pub(crate) struct Files<'a> {
     reader: &'a dyn FileReader,
@@ -88,7 +96,7 @@ pub(crate) struct Files<'a> {
 
 impl<'a> Files<'a> {
     pub(crate) fn new(reader: &'a dyn FileReader) -> Self {
-        Self { reader, seen: Vec::new(), hash: 0xcbf2_9ce4_8422_2325 }
+        Self { reader, seen: Vec::new(), hash: FNV_START }
     }
 
     /// Reads a file.
@@ -103,9 +111,7 @@ impl<'a> Files<'a> {
     }
 
     fn add_to_hash(&mut self, bytes: &[u8]) {
-        for byte in bytes.iter().chain(&bytes.len().to_le_bytes()) {
-            self.hash = (self.hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
-        }
+        self.hash = fnv(fnv(self.hash, bytes), &bytes.len().to_le_bytes());
     }
 }
 

@@ -85,6 +85,6 @@ pub mod state;
 
 pub use deform::{Deformation, Deformed, Metaballs};
 pub use import::{DEFAULT_SHININESS, MAX_TEXTURE_SIZE, Material, Mesh, MeshStatistics, MeshTriangle, Textures};
-pub use measure::{MeasureOptions, Measured, Measures};
+pub use measure::{MeasureOptions, Measures};
 pub use scene::{Light, LightShape, Scene, SceneObject};
 pub use state::SceneState;

@@ -17,6 +17,7 @@ use crate::{
     gpu_data::{self, Falloff},
     import::{Material, Mesh, Textures},
     lights,
+    measure::Memo,
     motion::{CameraPose, LightPose, Pose, Repeat, Track},
     sky::{Sky, SunLight},
     state::SceneState,
@@ -98,6 +99,8 @@ pub struct Scene {
     pub sources: Vec<PathBuf>,
     /// Hash of the contents of all files: equal hash, equal scene.
     pub hash: u64,
+    /// What is known of it.
+    pub(crate) memo: Memo,
 }
 
 /// Room that has become too small grows to what is needed and one part in so many more, so that it does not grow in every frame.

@@ -1,9 +1,10 @@
 //! Measured features: values known by thought, honest errors, the same bits whatever the threads, no scene that they fail on.
 
-use std::{collections::HashMap, fs, io, path::Path};
+use std::{collections::HashMap, fs, io, path::Path, sync::Arc};
 
 use glam::DVec3;
-use manylight_scene::{MeasureOptions, Measured, Measures, Scene, bvh::Bvh, gpu_data::View};
+use manylight_graph::features::Measured;
+use manylight_scene::{MeasureOptions, Measures, Scene, bvh::Bvh, gpu_data::View};
 
 fn asset(name: &str) -> Scene {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets")).join(name);
@@ -90,13 +91,26 @@ fn a_wall_between_blocks_all_of_one_bounce() {
 /// A floor seen from above in parallel light, and a plate above the camera whose shadow ends in the middle of the picture.
 #[test]
 fn half_of_a_floor_is_in_shadow() {
+    half_a_floor(1);
+}
+
+/// Of many lights, some are looked at from each point.
+#[test]
+fn half_of_a_floor_is_in_the_shadow_of_many_lights() {
+    half_a_floor(21);
+}
+
+fn half_a_floor(lights: usize) {
     let mesh = "v -9 0 -9\nv -9 0 9\nv 9 0 9\nv 9 0 -9\nf 1 2 3 4\nv -30 10 -20\nv -30 10 20\nv -10 10 20\nv -10 10 -20\nf 5 6 7 8\n";
-    let scene = "Scene(
+    let lights = "Directional(direction: (1.0, -1.0, 0.0), irradiance: 3.0),".repeat(lights);
+    let scene = format!(
+        "Scene(
         meshes: [\"floor.obj\"],
         camera: (origin: (0.0, 2.0, 0.0), target: (0.0, 0.0, 0.0), up: (1.0, 0.0, 0.0), fov_x_deg: 60.0),
-        lights: [Directional(direction: (1.0, -1.0, 0.0), irradiance: 3.0)],
-    )";
-    let measures = made(scene, &[("floor.obj", mesh)]).measure(&quick());
+        lights: [{lights}],
+    )"
+    );
+    let measures = made(&scene, &[("floor.obj", mesh)]).measure(&quick());
     agrees(measures["direct_occlusion"], 0.5, 0.0);
     assert!(measures["direct_occlusion"].standard_error < 0.01);
 }
@@ -282,4 +296,27 @@ fn all_pairs_of_points_say_the_same() {
     println!("all pairs {brute:.4}, measured {measured:?}, {} × {} points", seen.len(), lit.len());
     agrees(measured, brute, 0.05);
     assert!(brute > 0.05, "much is blocked there: {brute}");
+}
+
+#[test]
+fn a_scene_is_measured_once_and_a_changed_one_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = asset("cornell_empty.ron");
+    scene.keep_measures_in(folder.path().to_owned());
+    let first = scene.measured(1.0);
+    let again = scene.clone().measured(1.005);
+    assert!(Arc::ptr_eq(&first, &again), "a clone knows, and so nearly square a picture is square");
+    assert_ne!(*scene.measured(1.5), *first);
+    let mut white = scene.clone();
+    white.materials.iter_mut().for_each(|material| material.diffuse = glam::Vec3::splat(0.9));
+    let bright = white.measured(1.0);
+    assert!(bright["second_bounce"].value > first["second_bounce"].value + 0.1, "{:?}", bright.features);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+    let mut later = asset("cornell_empty.ron");
+    later.keep_measures_in(folder.path().to_owned());
+    assert_eq!(later.measured(1.0).features, first.features);
+    // No picture has such proportions.
+    for aspect in [0.0, f32::NAN, f32::INFINITY, -1.0] {
+        assert_eq!(later.measured(aspect).features, first.features);
+    }
 }

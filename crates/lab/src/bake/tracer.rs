@@ -187,7 +187,7 @@ impl<'a> Tracer<'a> {
         }
         let frames = paths.div_ceil(MOST_PATHS_A_FRAME);
         let settings = self.settings(light, paths.div_ceil(frames), seed);
-        let plan = self.documents.plan(&plan_input(&settings, &self.scene))?;
+        let plan = self.documents.plan(&plan_input(self.documents.pipeline(), &settings, &self.scene))?;
         let version = env!("CARGO_PKG_VERSION");
         let corners = self.atlas.as_ref().map(|atlas| &atlas.corners);
         // Faces of a cube are pictures as well: their number is in the size.
@@ -252,7 +252,8 @@ impl<'a> Tracer<'a> {
                 renderer
             }
             None => {
-                let scene = Scene { camera: camera.clone(), ..self.scene.clone() };
+                let mut scene = self.scene.clone();
+                scene.camera = camera.clone();
                 Renderer::with(self.gpu, self.documents.clone(), self.task.source.clone(), scene, settings)?
             }
         };

@@ -114,7 +114,8 @@ impl Prepared {
         let (mut faults, mut refusals) = (Diagnostics::default(), Diagnostics::default());
         for run in std::mem::take(&mut self.runs) {
             let scene = &self.scenes[run.scene].scene;
-            let (documents, input) = (&self.documents[run.variant], plan_input(&self.settings(&run), scene));
+            let documents = &self.documents[run.variant];
+            let input = plan_input(documents.pipeline(), &self.settings(&run), scene);
             let own = documents.refusals(&input);
             if !own.is_empty() {
                 self.refused.push(Refused::new(&self.sweep, &run.name, &own));

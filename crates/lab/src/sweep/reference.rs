@@ -68,7 +68,7 @@ impl Task<'_> {
     }
 
     fn plan(&self) -> Result<Plan, SweepError> {
-        Ok(self.documents.plan(&plan_input(&self.settings(), self.scene))?)
+        Ok(self.documents.plan(&plan_input(self.documents.pipeline(), &self.settings(), self.scene))?)
     }
 
     /// Hash of everything that the picture depends on but the adapter, which changes only its rounding.

@@ -44,7 +44,8 @@ impl Bench<'_> {
     pub fn inputs(&self, run: &Run) -> Result<String, SweepError> {
         let sweep = &self.prepared.sweep;
         let scene = &self.prepared.scenes[run.scene].scene;
-        let plan = self.prepared.documents[run.variant].plan(&plan_input(&self.prepared.settings(run), scene))?;
+        let documents = &self.prepared.documents[run.variant];
+        let plan = documents.plan(&plan_input(documents.pipeline(), &self.prepared.settings(run), scene))?;
         let reference = match self.prepared.reference_file(run) {
             Some(reference) => reference.facts.hash.clone(),
             None => self.prepared.task(run, self.time(sweep.frames_of(run.variant) - 1)).hash()?,

@@ -6,7 +6,6 @@ use std::{
     time::Duration,
 };
 
-use etcetera::BaseStrategy;
 use indicatif::ProgressBar;
 use manylight::{
     SceneSource,
@@ -31,10 +30,7 @@ pub fn cache(given: Option<&PathBuf>, name: &str) -> Result<PathBuf, Fault> {
     if let Some(folder) = given {
         return Ok(folder.clone());
     }
-    let strategy = etcetera::choose_base_strategy();
-    strategy
-        .map(|s| s.cache_dir().join("manylight").join(name))
-        .map_err(|e| Fault::Input(format!("there is no cache folder ({e}); name one with --cache or --records")))
+    library::cache(name).ok_or_else(|| Fault::Input("there is no cache folder; name one with --cache or --records".to_owned()))
 }
 
 /// The sweep of that name, in the size and for the pictures that the command line asks for.

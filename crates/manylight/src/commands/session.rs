@@ -52,7 +52,7 @@ impl Session {
     /// What will run. Without a scene, one that has no features is assumed.
     pub fn plan(&self, scene: Option<&LoadedScene>, settings: &Settings) -> Result<Plan, Fault> {
         let input = match scene {
-            Some(loaded) => plan_input(settings, &loaded.scene),
+            Some(loaded) => plan_input(self.pipeline(), settings, &loaded.scene),
             None => PlanInput {
                 output: settings.size,
                 set: settings.set.clone(),

@@ -20,6 +20,7 @@ use crate::{
     files::{FileReader, Files, beside, cannot_read, without_dots},
     fit,
     import::{Material, Mesh, MeshTriangle, TextureSet, import_obj, nowhere},
+    measure::Memo,
     motion::{Pose, Track},
     scene::{Light, Scene, SceneObject},
     sky::Sky,
@@ -304,6 +305,7 @@ impl Loader<'_> {
             warnings: out.sorted(),
             sources,
             hash,
+            memo: Memo::default(),
         })
     }
 }

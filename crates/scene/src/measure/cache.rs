@@ -8,7 +8,9 @@ use std::{
     path::PathBuf,
 };
 
-use super::{AtTimes, FEATURES, MeasureOptions, Measured, VERSION};
+use manylight_graph::features::{self, Measured};
+
+use super::{AtTimes, MeasureOptions, VERSION, memo::Fingerprint};
 use crate::{files, scene::Scene};
 
 /// First line of a file, with the version of the estimators.
@@ -19,12 +21,12 @@ fn key(scene: &Scene, options: &MeasureOptions) -> String {
     let MeasureOptions { aspect, samples, times, seed, .. } = options;
     // Who loads scenes otherwise, another release of this crate, may measure otherwise.
     let release = env!("CARGO_PKG_VERSION");
-    format!("{FORMAT} {VERSION} {release} scene {:016x} aspect {aspect:?} samples {samples} times {times} seed {seed}", scene.hash)
+    let Fingerprint(scene) = Fingerprint::of(scene);
+    format!("{FORMAT} {VERSION} {release} scene {scene:016x} aspect {aspect:?} samples {samples} times {times} seed {seed}")
 }
 
-/// FNV-1a, 64 bits.
 fn hash(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    files::fnv(files::FNV_START, text.as_bytes())
 }
 
 fn file(scene: &Scene, options: &MeasureOptions) -> Option<PathBuf> {
@@ -83,8 +85,8 @@ fn parse(text: &str, key: &str) -> Option<AtTimes> {
             _ => return None,
         }
     }
-    let is_whole = |features: &BTreeMap<String, Measured>| FEATURES.iter().all(|feature| features.contains_key(feature.name));
-    (!at_times.is_empty() && at_times.iter().all(|(_, features)| is_whole(features))).then_some(at_times)
+    let is_whole = |known: &BTreeMap<String, Measured>| features::measured().all(|name| known.contains_key(name));
+    (!at_times.is_empty() && at_times.iter().all(|(_, known)| is_whole(known))).then_some(at_times)
 }
 
 #[cfg(test)]
@@ -93,8 +95,8 @@ mod tests {
 
     fn some() -> AtTimes {
         let measured = |i: usize| Measured { value: 0.1 + 0.2 * i as f64, standard_error: 1e-3 / (i as f64 + 3.0) };
-        let features: BTreeMap<_, _> = FEATURES.iter().enumerate().map(|(i, feature)| (feature.name.to_owned(), measured(i))).collect();
-        vec![(0.0, features.clone()), (1.0 / 3.0, features)]
+        let some: BTreeMap<_, _> = features::measured().enumerate().map(|(i, name)| (name.to_owned(), measured(i))).collect();
+        vec![(0.0, some.clone()), (1.0 / 3.0, some)]
     }
 
     #[test]

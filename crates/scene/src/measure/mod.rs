@@ -40,6 +40,7 @@
 
 mod cache;
 mod light;
+mod memo;
 mod random;
 mod sums;
 mod times;
@@ -57,32 +58,19 @@ use std::{
     thread,
 };
 
+use manylight_graph::features::Measured;
+
+pub(crate) use self::memo::Memo;
 use self::{
     sums::{Formula, Quantity, Sums},
     world::{Geometry, World},
 };
 use crate::{random::hash2, scene::Scene};
 
-/// A value that was estimated.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Measured {
-    /// The estimate.
-    pub value: f64,
-    /// Of the estimate.
-    pub standard_error: f64,
-}
-
-impl Measured {
-    /// A value that the truth is hardly above.
-    pub fn at_most(&self) -> f64 {
-        self.value + 2.0 * self.standard_error
-    }
-}
-
 /// The features at each time in seconds.
 type AtTimes = Vec<(f64, BTreeMap<String, Measured>)>;
 
-/// A measured feature.
+/// How a measured feature follows from the samples; `manylight_graph::features::MEASURED` says what each is.
 struct Feature {
     name: &'static str,
     formula: Formula,

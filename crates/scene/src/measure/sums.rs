@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::{FEATURES, Measured};
+use manylight_graph::features::Measured;
+
+use super::FEATURES;
 
 /// What is summed over the samples of a batch. Light is the sum of its colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -160,6 +162,12 @@ mod tests {
         let mean = without.iter().sum::<f64>() / 5.0;
         let jackknife = (0.8 * without.iter().map(|v| (v - mean).powi(2)).sum::<f64>()).sqrt();
         assert!((jackknife / textbook - 1.0).abs() < 0.1, "{jackknife} against {textbook}");
+    }
+
+    #[test]
+    fn what_conditions_can_test_is_measured() {
+        let known: Vec<_> = manylight_graph::features::measured().collect();
+        assert_eq!(FEATURES.iter().map(|feature| feature.name).collect::<Vec<_>>(), known);
     }
 
     #[test]
