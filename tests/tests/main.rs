@@ -16,6 +16,7 @@ mod incremental;
 mod light_kinds;
 mod lights;
 mod matrix;
+mod measured;
 mod metrics;
 mod moving_light;
 mod path_tracer;
