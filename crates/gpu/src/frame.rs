@@ -19,7 +19,7 @@ use crate::{
     poison::{Fill, Poison},
     pool::{Memory, Place, Resource, copy},
     record::{compute, draw},
-    skip::Skipper,
+    skip::{Decision, Skipper},
     steps::dispatch_size,
     timing::{FrameTimings, Timer},
 };
@@ -150,6 +150,16 @@ impl Frame {
         self.timer.latest()
     }
 
+    /// What became of a node of the plan in the latest frame.
+    pub fn decision(&self, node: usize) -> Decision {
+        self.skipper.decision(node)
+    }
+
+    /// What a node of the plan reads that had changed in the latest frame since the node ran before. Of nodes on the host, none is known.
+    pub fn changed_inputs(&self, node: usize) -> impl Iterator<Item = Target> + '_ {
+        self.skipper.changed(node)
+    }
+
     /// Numbers of the latest frame that are NaN, infinite or beyond what a port promises, in the order of execution. None where
     /// [`BuildOptions::watch_numbers`](crate::BuildOptions::watch_numbers) is off. Waits for the GPU.
     ///
@@ -194,7 +204,7 @@ impl Frame {
         let stamp_of_host = |ix| host_bytes.get(&ix).map_or(0, |bytes| bytes.stamp);
         self.skipper.decide(parity, |name| externals.stamp(name), stamp_of_host);
         for ix in 0..self.nodes.len() {
-            self.timer.set_ran(ix, self.skipper.runs(ix));
+            self.timer.decided(ix, self.skipper.decision(ix));
         }
     }
 

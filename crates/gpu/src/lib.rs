@@ -66,6 +66,7 @@ pub use memory::MemoryReport;
 pub use numbers::{BadNumber, BadNumbers, NumberPlace};
 pub use pool::Memory;
 pub use readback::{Image, Subresource};
+pub use skip::Decision;
 pub use timing::{FrameTimings, NodeTiming};
 pub use watch::{WatchSet, Watcher};
 

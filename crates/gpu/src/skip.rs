@@ -31,6 +31,26 @@ pub(crate) struct Skipper {
     on: bool,
 }
 
+/// What became of a node in a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Decision {
+    /// It ran for the first time, or for the first time after all was forgotten.
+    First,
+    /// It ran.
+    Ran,
+    /// It did not run: nothing that it reads changed since it did.
+    Unchanged,
+    /// It did not run: for as many frames as it `settles` after, nothing changed but the number of the frame and what it wrote itself.
+    Settled,
+}
+
+impl Decision {
+    /// Whether the node ran.
+    pub fn ran(self) -> bool {
+        matches!(self, Self::First | Self::Ran)
+    }
+}
+
 struct NodeState {
     inputs: Vec<Target>,
     outputs: Vec<ResourceIx>,
@@ -40,7 +60,9 @@ struct NodeState {
     on_host: bool,
     /// Versions of the inputs when it ran last.
     ran_with: Vec<u64>,
-    runs: bool,
+    /// Whether an input has another version than when it ran before.
+    changed: Vec<bool>,
+    decision: Decision,
     /// Whether the copies of its histories differ although it does not run.
     copies: bool,
 }
@@ -53,14 +75,16 @@ impl Skipper {
         let nodes = plan.nodes.iter().map(|node| {
             let inputs = node.bindings.iter().filter(|(port, target)| !is_output(node, port) && *target != Target::Absent);
             let outputs: Vec<ResourceIx> = node.outputs().collect();
+            let inputs: Vec<Target> = inputs.map(|(_, target)| *target).collect();
             NodeState {
-                inputs: inputs.map(|(_, target)| *target).collect(),
+                changed: vec![true; inputs.len()],
+                inputs,
                 histories: outputs.iter().copied().filter(|ix| plan.resources[*ix].lifetime == Lifetime::History).collect(),
                 outputs,
                 settles: node.settles.map(u64::from),
                 on_host: node.decl.shader.is_none(),
                 ran_with: Vec::new(),
-                runs: true,
+                decision: Decision::First,
                 copies: false,
             }
         });
@@ -85,7 +109,19 @@ impl Skipper {
 
     /// Whether a node runs in this frame.
     pub(crate) fn runs(&self, node: usize) -> bool {
-        self.nodes[node].runs
+        self.nodes[node].decision.ran()
+    }
+
+    /// What became of a node in the frame that was decided last.
+    pub(crate) fn decision(&self, node: usize) -> Decision {
+        self.nodes[node].decision
+    }
+
+    /// Inputs of a node that had changed in the frame that was decided last since the node ran before; of nodes on the host, none is known.
+    pub(crate) fn changed(&self, node: usize) -> impl Iterator<Item = Target> + '_ {
+        let node = &self.nodes[node];
+        let is_known = !node.on_host;
+        node.inputs.iter().zip(&node.changed).filter(move |(_, changed)| **changed && is_known).map(|(target, _)| *target)
     }
 
     /// Histories whose other copy must be brought up to date in place of running their node.
@@ -111,11 +147,11 @@ impl Skipper {
         for node in nodes {
             if node.on_host {
                 // It ran already, or not.
-                node.runs = false;
+                node.decision = Decision::Unchanged;
                 for &ix in &node.outputs {
                     let stamp = host(ix);
                     if content[ix] != [stamp; 2] {
-                        (content[ix], cause[ix], node.runs) = ([stamp; 2], *now, true);
+                        (content[ix], cause[ix], node.decision) = ([stamp; 2], *now, Decision::Ran);
                     }
                 }
                 continue;
@@ -135,9 +171,18 @@ impl Skipper {
             let same = !is_first && node.inputs.iter().map(version).eq(node.ran_with.iter().copied());
             // Without inputs there is nothing that could change.
             let same = same || (node.inputs.is_empty() && node.ran_with == [0]);
-            node.runs = !(settled || *on && same);
+            node.decision = match () {
+                () if is_first => Decision::First,
+                () if *on && same => Decision::Unchanged,
+                () if settled => Decision::Settled,
+                () => Decision::Ran,
+            };
+            let runs = node.decision.ran();
+            for (ix, changed) in node.changed.iter_mut().enumerate() {
+                *changed = node.ran_with.get(ix).is_none_or(|known| *known != version(&node.inputs[ix]));
+            }
             node.copies = false;
-            if node.runs {
+            if runs {
                 node.ran_with.clear();
                 node.ran_with.extend(node.inputs.iter().map(version));
                 if node.inputs.is_empty() {
@@ -146,7 +191,7 @@ impl Skipper {
             }
             for &ix in &node.outputs {
                 let two = node.histories.contains(&ix);
-                if node.runs && !same {
+                if runs && !same {
                     *newest += 1;
                     if two {
                         content[ix][parity] = *newest;
@@ -155,7 +200,7 @@ impl Skipper {
                     }
                 } else if two && content[ix][parity] != content[ix][1 - parity] {
                     content[ix][parity] = content[ix][1 - parity];
-                    node.copies = !node.runs;
+                    node.copies = !runs;
                 }
                 cause[ix] = cause[ix].max(changed);
             }

@@ -5,7 +5,7 @@ use std::sync::{
     atomic::{AtomicU8, Ordering},
 };
 
-use crate::device::Gpu;
+use crate::{device::Gpu, skip::Decision};
 
 /// Frames whose timestamps can be under way at once.
 const RING: usize = 4;
@@ -26,6 +26,14 @@ pub struct NodeTiming {
     pub gpu_ns: Option<u64>,
     /// Whether it ran; if not, its times are zero and its outputs are those of an earlier frame.
     pub ran: bool,
+    /// If it did not run, whether that is because it has settled ([`Decision::Settled`]).
+    pub settled: bool,
+}
+
+impl NodeTiming {
+    fn decided(&mut self, decision: Decision) {
+        (self.ran, self.settled) = (decision.ran(), decision == Decision::Settled);
+    }
 }
 
 /// Times of one frame.
@@ -52,7 +60,7 @@ struct Slot {
     frame: u64,
     cpu_ns: u64,
     node_cpu_ns: Vec<u64>,
-    node_ran: Vec<bool>,
+    decisions: Vec<Decision>,
 }
 
 struct Queries {
@@ -73,7 +81,7 @@ pub(crate) struct Timer {
     latest: FrameTimings,
     has_sample: bool,
     node_cpu_ns: Vec<u64>,
-    node_ran: Vec<bool>,
+    decisions: Vec<Decision>,
 }
 
 impl Timer {
@@ -85,7 +93,7 @@ impl Timer {
             let fits = has_passes && count + 2 <= MOST_QUERIES;
             first.push(fits.then_some(count));
             count += if fits { 2 } else { 0 };
-            NodeTiming { id, stage, cpu_ns: 0, gpu_ns: None, ran: true }
+            NodeTiming { id, stage, cpu_ns: 0, gpu_ns: None, ran: true, settled: false }
         };
         let nodes: Vec<_> = nodes.map(name).collect();
         let wanted = gpu_times && gpu.has_timestamps() && count > 0;
@@ -93,7 +101,7 @@ impl Timer {
         Self {
             queries,
             node_cpu_ns: vec![0; nodes.len()],
-            node_ran: vec![true; nodes.len()],
+            decisions: vec![Decision::First; nodes.len()],
             latest: FrameTimings { nodes, ..Default::default() },
             has_sample: false,
         }
@@ -118,12 +126,12 @@ impl Timer {
         }
     }
 
-    /// Whether a node runs in the frame being recorded; if not, it costs nothing.
-    pub(crate) fn set_ran(&mut self, node: usize, ran: bool) {
-        if let Some(slot) = self.node_ran.get_mut(node) {
-            *slot = ran;
+    /// What becomes of a node in the frame being recorded; if it does not run, it costs nothing.
+    pub(crate) fn decided(&mut self, node: usize, decision: Decision) {
+        if let Some(slot) = self.decisions.get_mut(node) {
+            *slot = decision;
         }
-        if !ran {
+        if !decision.ran() {
             self.set_cpu(node, 0);
         }
     }
@@ -143,8 +151,9 @@ impl Timer {
     }
 
     fn take_cpu_times(&mut self) {
-        for (node, (ns, ran)) in self.latest.nodes.iter_mut().zip(self.node_cpu_ns.iter().zip(&self.node_ran)) {
-            (node.cpu_ns, node.ran) = (*ns, *ran);
+        for (node, (ns, decision)) in self.latest.nodes.iter_mut().zip(self.node_cpu_ns.iter().zip(&self.decisions)) {
+            node.cpu_ns = *ns;
+            node.decided(*decision);
         }
     }
 
@@ -178,7 +187,7 @@ impl Timer {
                 let slot = &mut queries.ring[chosen];
                 (slot.frame, slot.cpu_ns) = (frame, cpu_ns);
                 slot.node_cpu_ns.copy_from_slice(&self.node_cpu_ns);
-                slot.node_ran.copy_from_slice(&self.node_ran);
+                slot.decisions.copy_from_slice(&self.decisions);
                 slot.state.store(PENDING, Ordering::Release);
                 let state = slot.state.clone();
                 slot.buffer.map_async(wgpu::MapMode::Read, .., move |result| {
@@ -228,7 +237,8 @@ fn take(slot: &Slot, firsts: &[Option<u32>], period_ns: f64, into: &mut FrameTim
     let nanoseconds = |from: u64, to: u64| Some((to.checked_sub(from)? as f64 * period_ns) as u64);
     let (mut first, mut last) = (u64::MAX, 0);
     for (i, node) in into.nodes.iter_mut().enumerate() {
-        (node.cpu_ns, node.ran) = (slot.node_cpu_ns[i], slot.node_ran[i]);
+        node.cpu_ns = slot.node_cpu_ns[i];
+        node.decided(slot.decisions[i]);
         if !node.ran {
             // Its queries hold what an earlier frame wrote.
             node.gpu_ns = firsts[i].map(|_| 0);
@@ -241,7 +251,7 @@ fn take(slot: &Slot, firsts: &[Option<u32>], period_ns: f64, into: &mut FrameTim
         });
     }
     into.gpu_ns = match last {
-        0 if slot.node_ran.contains(&true) => None,
+        0 if slot.decisions.iter().any(|decision| decision.ran()) => None,
         0 => Some(0),
         last => nanoseconds(first, last),
     };
@@ -262,7 +272,7 @@ impl Queries {
             frame: 0,
             cpu_ns: 0,
             node_cpu_ns: vec![0; nodes],
-            node_ran: vec![true; nodes],
+            decisions: vec![Decision::First; nodes],
         };
         Self {
             set: device.create_query_set(&wgpu::QuerySetDescriptor { label: Some("timestamps"), ty: wgpu::QueryType::Timestamp, count }),

@@ -32,8 +32,12 @@ pub struct NodeSamples {
     pub cpu: Samples,
     /// Its work on the GPU.
     pub gpu: Samples,
+    /// Its work, on the processor that does it, in the frames in which it was not skipped.
+    pub running: Samples,
     /// Frames in which it was skipped: nothing of what it depends on had changed.
     pub skipped: usize,
+    /// How many of these for having settled.
+    pub settled: usize,
 }
 
 /// Times of several frames, in milliseconds.
@@ -76,6 +80,9 @@ impl FrameSamples {
             samples.cpu.push(Some(milliseconds(timing.cpu_ns)));
             samples.gpu.push(timing.gpu_ns.map(milliseconds));
             samples.skipped += usize::from(!timing.ran);
+            samples.settled += usize::from(timing.settled);
+            let work = if samples.host { Some(timing.cpu_ns) } else { timing.gpu_ns };
+            samples.running.push(work.filter(|_| timing.ran).map(milliseconds));
         }
     }
 

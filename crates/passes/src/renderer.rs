@@ -316,6 +316,11 @@ impl Renderer {
         self.frame.forget();
     }
 
+    /// Lets every node run in the next frame, whether what it reads has changed or not.
+    pub fn forget(&mut self) {
+        self.frame.forget();
+    }
+
     /// Reads a texture of the latest frame: the picture, the radiance, a history, or one named in [`Settings::keep`]. Waits for the GPU.
     ///
     /// # Errors
