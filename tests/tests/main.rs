@@ -7,6 +7,7 @@ mod clustering;
 mod deforming;
 mod determinism;
 mod energy;
+mod explain;
 mod faults;
 mod functions;
 mod fuzz;

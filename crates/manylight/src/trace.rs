@@ -11,10 +11,13 @@ use manylight::{
     fault::Fault,
     files::{FileError, write_text},
     gpu::FrameTimings,
+    graph::plan::Plan,
 };
 use serde_json::{Value, json};
 use tracing_chrome::{ChromeLayerBuilder, FlushGuard};
 use tracing_subscriber::layer::SubscriberExt;
+
+use crate::commands::states::{self, State};
 
 /// Track of the GPU in the trace; the CPU's threads count from 0.
 const GPU_TRACK: u32 = 1000;
@@ -27,6 +30,8 @@ pub struct Trace {
     gpu: Vec<Value>,
     /// End of the last GPU interval in microseconds: intervals of one queue do not overlap.
     gpu_end: f64,
+    /// Why each node of the plan runs, and why it is skipped: unchanged, or settled.
+    reasons: Vec<[String; 3]>,
 }
 
 #[derive(Clone, Default)]
@@ -51,7 +56,7 @@ impl Trace {
         let (layer, guard) = ChromeLayerBuilder::new().writer(buffer.clone()).include_args(true).include_locations(false).build();
         tracing::subscriber::set_global_default(tracing_subscriber::registry().with(layer))
             .map_err(|e| Fault::Input(format!("cannot record a trace: {e}")))?;
-        Ok(Self { buffer, guard, start, gpu: Vec::new(), gpu_end: 0.0 })
+        Ok(Self { buffer, guard, start, gpu: Vec::new(), gpu_end: 0.0, reasons: Vec::new() })
     }
 
     /// Microseconds since the start.
@@ -59,16 +64,39 @@ impl Trace {
         self.start.elapsed().as_secs_f64() * 1e6
     }
 
+    /// Takes over what is known of a plan that is run from now on, and marks the nodes of it that do not run.
+    pub fn plan(&mut self, plan: &Plan) {
+        let states = states::of_plan(plan);
+        let running = states.iter().zip(&plan.nodes);
+        let skipped = |node, settled| states::skipped_reason(plan, node, settled);
+        self.reasons = running.map(|(state, node)| [state.reason.clone(), skipped(node, false), skipped(node, true)]).collect();
+        let at = self.now_us();
+        for node in states.iter().filter(|node| node.state != State::Runs) {
+            self.mark(&node.id, &node.stage, at, json!({"state": node.state.to_string(), "reason": node.reason}));
+        }
+    }
+
+    /// A point in time on the track of the GPU.
+    fn mark(&mut self, id: &str, stage: &str, at: f64, args: Value) {
+        self.gpu.push(json!({"name": id, "cat": stage, "ph": "i", "s": "t", "pid": 1, "tid": GPU_TRACK, "ts": at, "args": args}));
+    }
+
     /// Adds the GPU intervals of a frame that was recorded from `from_us` on. Timestamps tell how long each node took, not
-    /// when the queue began: nodes are laid end to end, in order, from the time of recording or the end of the frame before.
+    /// when the queue began: nodes are laid end to end, in order, from the time of recording or the end of the frame before. Nodes that were skipped are points in time.
     pub fn gpu_frame(&mut self, timings: &FrameTimings, from_us: f64) {
         let mut at = from_us.max(self.gpu_end);
-        for node in &timings.nodes {
+        for (ix, node) in timings.nodes.iter().enumerate() {
+            let reason = |kind: usize| self.reasons.get(ix).map(|reasons| reasons[kind].clone());
+            if !node.ran {
+                let reason = reason(if node.settled { 2 } else { 1 });
+                self.mark(&node.id, &node.stage, at, json!({"frame": timings.frame, "state": "skipped", "reason": reason}));
+                continue;
+            }
             let Some(ns) = node.gpu_ns else { continue };
             let duration = ns as f64 / 1e3;
             self.gpu.push(json!({
                 "name": node.id, "cat": node.stage, "ph": "X", "pid": 1, "tid": GPU_TRACK, "ts": at, "dur": duration,
-                "args": {"frame": timings.frame},
+                "args": {"frame": timings.frame, "state": "runs", "reason": reason(0)},
             }));
             at += duration;
         }

@@ -225,17 +225,19 @@ pub struct GraphArgs {
 
 /// `manylight explain`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  manylight explain acrsm --scene cornell --set visibility=none")]
+#[command(after_help = "Examples:\n  manylight explain acrsm --scene cornell --set visibility=none\n  \
+    manylight explain acrsm --scene cornell --size 256x256 --frames 40 --fps 30\n\
+    Without --frames it needs no GPU.")]
 pub struct ExplainArgs {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub pipeline: PipelineArgs,
-    /// A scene: a path to a .ron or .obj file, or a name such as `cornell`
-    #[arg(long, value_name = "SCENE")]
-    pub scene: String,
     #[command(flatten)]
     #[allow(missing_docs)]
-    pub size: SizeArgs,
+    pub frame: FrameArgs,
+    /// Render so many frames, and say which nodes ran in the last and for what change, which were skipped, and the time that is saved
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub frames: Option<u32>,
     /// How to print
     #[arg(long, value_enum, default_value = "text")]
     pub format: TextOrJson,

@@ -1,108 +1,93 @@
-//! `manylight explain`: a line a node: what will run, what will not, and why.
+//! `manylight explain`: a line a node: what runs, what does not, why, and what that saves.
 
-use manylight::{
-    Settings,
-    fault::Fault,
-    graph::plan::{Idle, Lifetime, Plan, PlanNode, Target},
-    graph::registry::Direction,
+use manylight::{fault::Fault, lab::facts};
+use serde_json::{Value, json};
+
+use super::{
+    adapter_line,
+    costs::Times,
+    session::{Session, of_render, settings, time_of},
+    states::{self, NodeState, State},
 };
-use serde_json::json;
+use crate::{
+    cli::{Cli, ExplainArgs, TextOrJson},
+    progress,
+};
 
-use super::session::Session;
-use crate::cli::{Cli, ExplainArgs, TextOrJson};
-
-/// A line of the explanation.
-struct Line {
-    id: String,
-    state: &'static str,
-    reason: String,
-    node: String,
-    stage: String,
-}
-
-/// Plans without a GPU and prints a line a node.
+/// Plans without a GPU and prints a line a node; with frames, renders these and says what became of the nodes in the last.
 pub fn run(cli: &Cli, args: &ExplainArgs) -> Result<(), Fault> {
     let session = Session::open(cli, &args.pipeline.pipeline)?;
-    let scene = session.scene(&args.scene)?;
-    let settings = Settings { size: args.size.size, set: args.pipeline.set.clone(), ..Settings::default() };
+    let scene = session.scene(&args.frame.scene)?;
+    let settings = settings(&args.pipeline, &args.frame, Vec::new())?;
     let plan = session.plan(Some(&scene), &settings)?;
-    let lines = lines(&plan);
-    match args.format {
-        TextOrJson::Text => super::print(&text(&lines)),
-        TextOrJson::Json => {
-            let nodes: Vec<_> =
-                lines.iter().map(|l| json!({"id": l.id, "state": l.state, "reason": l.reason, "node": l.node, "stage": l.stage})).collect();
-            super::print(&format!("{:#}\n", json!({"pipeline": session.pipeline().name, "nodes": nodes})))
-        }
-    }
-}
-
-fn text(lines: &[Line]) -> String {
-    let width = lines.iter().map(|l| l.id.chars().count()).max().unwrap_or(0);
-    lines.iter().map(|l| format!("{:<width$}  {:<4}  {}\n", l.id, l.state, l.reason)).collect()
-}
-
-fn lines(plan: &Plan) -> Vec<Line> {
-    let running = plan.nodes.iter().map(|node| Line {
-        id: node.id.clone(),
-        state: "runs",
-        reason: reason(plan, node),
-        node: node.decl.name.clone(),
-        stage: node.stage.clone(),
-    });
-    let idle = plan.idle.iter().map(|node| {
-        let (state, reason) = match &node.reason {
-            Idle::Off(clause) => ("off", format!("its condition does not hold: {clause}")),
-            Idle::Dead => ("dead", "nothing that is shown, kept or remembered needs what it writes".to_owned()),
+    let Some(frames) = args.frames else {
+        let states = states::of_plan(&plan);
+        return match args.format {
+            TextOrJson::Text => super::print(&text(&states, None)),
+            TextOrJson::Json => super::print(&format!("{:#}\n", report(&session.pipeline().name, &states, None))),
         };
-        Line { id: node.id.clone(), state, reason, node: node.kind.clone(), stage: node.stage.clone() }
-    });
-    running.chain(idle).collect()
-}
-
-/// Who needs what the node writes.
-fn reason(plan: &Plan, node: &PlanNode) -> String {
-    let mut parts = Vec::new();
-    for (port, target) in &node.bindings {
-        let (Target::Resource(index), Some(declared)) = (target, node.decl.ports.get(port)) else { continue };
-        if declared.direction != Direction::Output {
-            continue;
-        }
-        let uses = uses(plan, *index);
-        if !uses.is_empty() {
-            parts.push(format!("`{}` is {}", plan.resources[*index].name, uses.join(" and ")));
-        }
-    }
-    if parts.is_empty() { "culling is off: nobody needs what it writes".to_owned() } else { parts.join("; ") }
-}
-
-fn uses(plan: &Plan, resource: usize) -> Vec<String> {
-    let mut uses = Vec::new();
-    if plan.presents == resource {
-        uses.push("presented".to_owned());
-    } else if plan.radiance == Some(resource) {
-        uses.push("the linear radiance".to_owned());
-    } else if plan.resources[resource].lifetime == Lifetime::Kept {
-        uses.push("kept for reading".to_owned());
-    }
-    let readers = |wanted: Target| -> Vec<String> {
-        plan.nodes
-            .iter()
-            .filter(|n| {
-                n.bindings
-                    .iter()
-                    .any(|(port, target)| *target == wanted && n.decl.ports.get(port).is_some_and(|p| p.direction == Direction::Input))
-            })
-            .map(|n| n.id.clone())
-            .collect()
     };
-    let now = readers(Target::Resource(resource));
-    if !now.is_empty() {
-        uses.push(format!("read by {}", now.join(", ")));
+    let gpu = super::open_gpu(args.frame.adapter.as_ref())?;
+    let mut renderer = session.renderer(&gpu, scene, settings)?;
+    let time = |frame: u32| time_of(&args.frame, frame.into());
+    let bar = progress::bar(frames.into(), "rendering");
+    for frame in 0..frames {
+        renderer.render_frame(time(frame)).map_err(of_render)?;
+        renderer.wait_timings();
+        bar.inc(1);
     }
-    let next = readers(Target::Previous(resource));
-    if !next.is_empty() {
-        uses.push(format!("read in the next frame by {}", next.join(", ")));
+    bar.finish_and_clear();
+    let states = states::of_frame(renderer.frame());
+    let times = Times::measure(&mut renderer, frames, time)?;
+    match args.format {
+        TextOrJson::Text => {
+            let adapter = adapter_line(renderer.gpu());
+            super::print(&format!("{}\n{}adapter: {adapter}\n", text(&states, Some(&times)), line(&times, &states, frames)))
+        }
+        TextOrJson::Json => {
+            let mut report = report(&renderer.pipeline().name, &states, Some(&times));
+            report["frames"] = json!(frames);
+            report["adapter"] = facts::adapter(renderer.gpu());
+            let (ran, everything) = times.totals(&states);
+            report["time_ms"] = json!({"ran": ran, "everything": everything});
+            super::print(&format!("{report:#}\n"))
+        }
     }
-    uses
+}
+
+fn line(times: &Times, states: &[NodeState], frames: u32) -> String {
+    let (own, all) = times.totals(states);
+    let what = if times.has_switches() { "with every switch on and nothing skipped" } else { "with nothing skipped" };
+    let compared = match all {
+        Some(all) if all > 0.0 => format!("; {what} {all:.3} ms, so that {:.1} % is saved", 100.0 * (1.0 - own / all)),
+        _ => String::new(),
+    };
+    format!("nodes that ran in frame {frames}: {own:.3} ms{compared}\n")
+}
+
+fn text(states: &[NodeState], times: Option<&Times>) -> String {
+    let width = states.iter().map(|l| l.id.chars().count()).max().unwrap_or(0);
+    // A plan alone skips nothing.
+    let state_width = if times.is_some() { 7 } else { 4 };
+    let line = |node: &NodeState| {
+        let saved = times.and_then(|times| times.saved(node)).map(|ms| format!("; saves {ms:.3} ms")).unwrap_or_default();
+        format!("{:<width$}  {:<state_width$}  {}{saved}\n", node.id, node.state, node.reason)
+    };
+    states.iter().map(line).collect()
+}
+
+fn report(pipeline: &str, states: &[NodeState], times: Option<&Times>) -> Value {
+    let nodes: Vec<Value> = states
+        .iter()
+        .map(|node| {
+            let mut object = node.to_json();
+            if let Some(times) = times {
+                let is_running = node.state == State::Runs;
+                object["time_ms"] = json!(if is_running { times.of(&node.id) } else { None });
+                object["saved_ms"] = json!(times.saved(node));
+            }
+            object
+        })
+        .collect();
+    json!({"pipeline": pipeline, "nodes": nodes})
 }

@@ -13,9 +13,11 @@ pub mod sweep;
 pub mod tune;
 pub mod watch;
 
+mod costs;
 mod lab;
 mod outputs;
 mod session;
+pub mod states;
 mod stats;
 mod table;
 

@@ -13,8 +13,11 @@ use manylight::{
 use serde_json::json;
 
 use super::{
-    adapter_line, of_file,
+    adapter_line,
+    costs::{Times, has_switches},
+    of_file,
     session::{Session, of_render, settings, time_of},
+    states::{self, NodeState, State},
     stats,
     table::{Table, bytes},
 };
@@ -47,9 +50,10 @@ pub fn run(cli: &Cli, args: &ProfileArgs) -> Result<(), Fault> {
     if let (Some(trace), Some(file)) = (trace, &args.trace) {
         trace.write(file)?;
     }
+    let states = node_states(&mut renderer, args, &samples, u64::from(args.warm_up) + u64::from(args.frames))?;
     match args.format {
-        TextOrJson::Text => super::print(&text(&renderer, args, &samples)),
-        TextOrJson::Json => super::print(&format!("{:#}\n", report(&renderer, args, &samples))),
+        TextOrJson::Text => super::print(&text(&renderer, args, &samples, &states)),
+        TextOrJson::Json => super::print(&format!("{:#}\n", report(&renderer, args, &samples, &states))),
     }
 }
 
@@ -65,6 +69,9 @@ fn is_serial(renderer: &Renderer, args: &ProfileArgs) -> bool {
 /// Measures ordinary frames; when nodes are timed serially, as many more for the nodes.
 fn measure(renderer: &mut Renderer, args: &ProfileArgs, mut trace: Option<&mut Trace>) -> Result<FrameSamples, Fault> {
     let mut samples = FrameSamples::new(renderer.plan());
+    if let Some(trace) = &mut trace {
+        trace.plan(renderer.plan());
+    }
     let serial = is_serial(renderer, args);
     let rounds: &[bool] = if serial { &[false, true] } else { &[false] };
     let bar = progress::bar(rounds.len() as u64 * u64::from(args.frames), "measuring");
@@ -100,6 +107,45 @@ fn cost(node: &NodeSamples) -> Option<f64> {
     if node.host { node.cpu.median() } else { node.gpu.median() }
 }
 
+/// What became of each node, with the milliseconds that this saved in a frame.
+type States = Vec<(NodeState, Option<f64>)>;
+
+/// The states of all nodes; what does not run in every frame is measured for what it would cost.
+fn node_states(renderer: &mut Renderer, args: &ProfileArgs, samples: &FrameSamples, frames: u64) -> Result<States, Fault> {
+    let states = states::over_frames(renderer.plan(), samples);
+    let is_left_out = states.iter().any(|node| node.state != State::Runs) && has_switches(renderer);
+    if !is_left_out && samples.nodes.iter().all(|node| node.skipped == 0) {
+        return Ok(states.into_iter().map(|node| (node, None)).collect());
+    }
+    let frames = u32::try_from(frames).unwrap_or(u32::MAX);
+    let times = Times::measure(renderer, frames, |frame| time_of(&args.frame, frame.into()))?;
+    let saved = |node: &NodeState| {
+        let skipped = samples.nodes.iter().find(|samples| samples.id == node.id).filter(|samples| samples.skipped > 0);
+        match skipped {
+            Some(samples) => times.of(&node.id).map(|ms| ms * samples.skipped as f64 / samples.cpu.len() as f64),
+            None => times.saved(node),
+        }
+    };
+    let with_saved = states.into_iter().map(|node| {
+        let saved = saved(&node);
+        (node, saved)
+    });
+    Ok(with_saved.collect())
+}
+
+/// A table of what does not run, and why.
+fn idle_table(states: &States) -> String {
+    let mut table = Table::new(&[("does not run", true), ("stage", true), ("state", true), ("saves", false), ("why", true)]);
+    let idle = states.iter().filter(|(node, _)| node.state != State::Runs);
+    let mut any = false;
+    for (node, saved) in idle {
+        any = true;
+        let saved = saved.map_or_else(|| "-".to_owned(), |ms| format!("{ms:.3}"));
+        table.row(vec![node.id.clone(), node.stage.clone(), node.state.to_string(), saved, node.reason.clone()]);
+    }
+    if any { format!("{}\n", table.render()) } else { String::new() }
+}
+
 fn ms(value: Option<f64>) -> String {
     value.map_or("no sample".to_owned(), |v| format!("{v:.3}"))
 }
@@ -123,7 +169,7 @@ fn heading(renderer: &Renderer, args: &ProfileArgs) -> String {
     )
 }
 
-fn text(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> String {
+fn text(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples, states: &States) -> String {
     let all: Vec<&NodeSamples> = samples.nodes.iter().collect();
     let attributed = sum(&all, |n| n.gpu.median());
     // Work of one pass may overlap the timestamps of another: what the nodes do not account for is shown, not hidden.
@@ -171,9 +217,10 @@ fn text(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> Stri
         if renderer.gpu().has_timestamps() || serial { "" } else { "this adapter has no timestamps: GPU times are no sample\n" };
     let method = if serial { "; GPU: each node submitted on its own and waited for" } else { "; GPU: timestamps" };
     format!(
-        "{}{no_timestamps}\ntimes in milliseconds{method}; CPU: to record\n{}\n{}\n{}\n{}",
+        "{}{no_timestamps}\ntimes in milliseconds{method}; CPU: to record\n{}\n{}{}\n{}\n{}",
         heading(renderer, args),
         nodes.render(),
+        idle_table(states),
         stages.render(),
         frame.render(),
         memory_table(renderer)
@@ -200,7 +247,7 @@ fn memory_table(renderer: &Renderer) -> String {
     )
 }
 
-fn report(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> serde_json::Value {
+fn report(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples, states: &States) -> serde_json::Value {
     let (width, height) = renderer.settings().size;
     let stages: Vec<_> = samples
         .by_stage()
@@ -216,6 +263,12 @@ fn report(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> se
         .collect();
     let mut report = timing::timings(samples, is_serial(renderer, args));
     report["stages"] = json!(stages);
+    let states = states.iter().map(|(node, saved)| {
+        let mut object = node.to_json();
+        object["saved_ms"] = json!(saved);
+        object
+    });
+    let states: Vec<_> = states.collect();
     json!({
         "manylight": env!("CARGO_PKG_VERSION"),
         "pipeline": renderer.pipeline().name,
@@ -226,6 +279,7 @@ fn report(renderer: &Renderer, args: &ProfileArgs, samples: &FrameSamples) -> se
         "adapter": facts::adapter(renderer.gpu()),
         "parameters": facts::parameters(renderer.plan()),
         "timings": report,
+        "states": states,
         "memory": stats::memory(renderer),
     })
 }
