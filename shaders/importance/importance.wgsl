@@ -21,7 +21,7 @@ struct Params {
 @group(0) @binding(1) var<uniform> scene_camera: View;
 @group(0) @binding(2) var<uniform> seed: Seed;
 @group(0) @binding(3) var<uniform> params: Params;
-@group(0) @binding(4) var rsm_flux: texture_2d<f32>;
+@group(0) @binding(4) var<storage, read> lit_texels: array<u32>;
 @group(0) @binding(5) var rsm_albedo: texture_2d<f32>;
 @group(0) @binding(6) var rsm_specular: texture_2d<f32>;
 @group(0) @binding(7) var rsm_normal: texture_2d<u32>;
@@ -29,9 +29,10 @@ struct Params {
 @group(0) @binding(9) var gbuffer_normal: texture_2d<u32>;
 @group(0) @binding(10) var gbuffer_distance: texture_2d<f32>;
 @group(0) @binding(11) var importance_map: texture_storage_2d<r32float, write>;
+@group(0) @binding(12) var<storage, read> lit_texel_groups: array<vec4u>;
 
 const MAX_SAMPLES: u32 = 256u;
-const LANES: u32 = 64u;
+const LANES: u32 = 256u;
 
 // The sampled positions of the picture, gathered once a group; normal zero where the sample met no surface.
 var<workgroup> sample_position: array<vec3f, MAX_SAMPLES>;
@@ -61,37 +62,42 @@ fn view_importance(lit: vec3f, lit_normal: vec3f) -> f32 {
     return sum / f32(params.view_samples);
 }
 
+// The map may be padded to a power of two.
 @compute @workgroup_size(8, 8)
-fn estimate(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) lane: u32) {
+fn clear(@builtin(global_invocation_id) id: vec3u) {
+    if all(id.xy < textureDimensions(importance_map)) {
+        textureStore(importance_map, id.xy, vec4f(0.0));
+    }
+}
+
+@compute @workgroup_size(LANES)
+fn estimate(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
     if params.view_weight > 0.0 {
         gather_samples(lane);
     }
     workgroupBarrier();
-    let size = textureDimensions(importance_map);
-    if any(id.xy >= size) {
+    let place = LANES * (group.x + group.y * groups.x) + lane;
+    if place >= lit_texel_groups[0].w {
         return;
     }
-    // The map may be padded to a power of two.
-    let rsm_size = textureDimensions(rsm_flux);
-    var importance = 0.0;
-    if all(id.xy < rsm_size) && max_component(textureLoad(rsm_flux, id.xy, 0).rgb) > 0.0 {
-        let view = scene_light_views[view_of_texel(id.xy, rsm_size)];
-        let source = scene_lights[view.light];
-        let ray = texel_ray(id.xy, rsm_size);
-        let light = source.strength / max(max_component(source.strength), 1e-30) * saturate(falloff(source, ray.direction));
-        let specular = textureLoad(rsm_specular, id.xy, 0);
-        let f_d = max_component(textureLoad(rsm_albedo, id.xy, 0).rgb * light); // [ACRSM] eq. 5.1
-        let f_s = max_component(specular.rgb * light) * saturate(specular.a / params.shininess_scale); // [ACRSM] eq. 5.2
-        let brdf = f_d * params.diffuse_weight + f_s * (1.0 - params.diffuse_weight); // [ACRSM] eq. 4.1
-        importance = (1.0 - params.view_weight) * brdf;
-        if params.view_weight > 0.0 {
-            let lit = ray.origin + ray.direction * textureLoad(rsm_distance, id.xy, 0).x;
-            importance += params.view_weight * view_importance(lit, unpack_unit(textureLoad(rsm_normal, id.xy, 0).x)); // [ACRSM] eq. 4.3
-        }
-        // Lights share the virtual lights by what their texels can reflect.
-        importance *= view.weight;
-        // A lit texel is never worth nothing: warping must be able to reach it.
-        importance = max(importance, 1e-6);
+    let texel = vec2u(lit_texels[place] & 0xffffu, lit_texels[place] >> 16u);
+    let rsm_size = textureDimensions(rsm_albedo);
+    let view = scene_light_views[view_of_texel(texel, rsm_size)];
+    let source = scene_lights[view.light];
+    let ray = texel_ray(texel, rsm_size);
+    let light = source.strength / max(max_component(source.strength), 1e-30) * saturate(falloff(source, ray.direction));
+    let specular = textureLoad(rsm_specular, texel, 0);
+    let f_d = max_component(textureLoad(rsm_albedo, texel, 0).rgb * light); // [ACRSM] eq. 5.1
+    let f_s = max_component(specular.rgb * light) * saturate(specular.a / params.shininess_scale); // [ACRSM] eq. 5.2
+    let brdf = f_d * params.diffuse_weight + f_s * (1.0 - params.diffuse_weight); // [ACRSM] eq. 4.1
+    var importance = (1.0 - params.view_weight) * brdf;
+    if params.view_weight > 0.0 {
+        let lit = ray.origin + ray.direction * textureLoad(rsm_distance, texel, 0).x;
+        importance += params.view_weight * view_importance(lit, unpack_unit(textureLoad(rsm_normal, texel, 0).x)); // [ACRSM] eq. 4.3
     }
-    textureStore(importance_map, id.xy, vec4f(importance, 0.0, 0.0, 0.0));
+    // Lights share the virtual lights by what their texels can reflect.
+    importance *= view.weight;
+    // A lit texel is never worth nothing: warping must be able to reach it.
+    importance = max(importance, 1e-6);
+    textureStore(importance_map, texel, vec4f(importance, 0.0, 0.0, 0.0));
 }
