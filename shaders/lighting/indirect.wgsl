@@ -1,5 +1,6 @@
 // Indirect light with soft shadows from shadow maps, or with hard ones by rays. [ACRSM] 5.3.3, [VAL] 6, [PCSS], [CV] 4.
-// Tile t is lit by the clusters c with c mod n² = t, times n². Eq. 5.5's intensity omits the light's flux: here it is included (methods: radiometry).
+// Tile t is lit by the clusters c with c mod n² = t, times n². Only 8×8 blocks with a surface are lit, with `culling` by the lights left in each.
+// Eq. 5.5's intensity omits the light's flux: here it is included (methods: radiometry).
 // Differs from the papers: taps are compared with the receiver's tangent plane, the bias is a share of the distance.
 // What bounds it: k / n² lights per pixel, with each 32 reads of the atlas (pcss) or a ray through some tens of nodes (exact: on a software
 // adapter twice the time of pcss in a box of some tens of triangles, seven times in an atrium of 66,000). Mesa's software adapters end all loops of
@@ -7,8 +8,11 @@
 // atrium of 66,000 triangles 512 keep all light, 1024 lose a sixth of it).
 
 #import common::bvh::{ray_offset, visible}
+#import common::bounds::SurfaceBounds
 #import common::cluster::{Cluster, CLUSTER_ACTIVE}
 #import common::cssm::{depth_range, fetch, region, series, series_value, slabs_of}
+#import common::culling::{full_word, lights_of_tile, words_of_tile}
+#import common::lit_tiles::corner_of_tile
 #import common::scene::SceneInfo
 #import common::octahedral::unpack_unit
 #import common::paraboloid::{basis, paraboloid_project, paraboloid_unproject, paraboloid_scale, atlas_origin}
@@ -41,6 +45,10 @@ struct Params {
 @group(0) @binding(8) var<storage, read> caster_of: array<u32>;
 @group(0) @binding(9) var cssm: texture_2d<f32>;
 @group(0) @binding(10) var linear_sampler: sampler;
+@group(0) @binding(11) var<storage, read> surface_blocks: array<SurfaceBounds>;
+@group(0) @binding(12) var<storage, read> lit_blocks: array<u32>;
+@group(0) @binding(13) var<storage, read> lit_block_groups: array<vec4u>;
+@group(0) @binding(14) var<storage, read> block_lights: array<u32>;
 
 override lights_is_val: bool;
 override visibility_is_simple: bool;
@@ -49,6 +57,7 @@ override visibility_is_cssm: bool;
 override visibility_is_exact: bool;
 override maps_is_imperfect: bool;
 override shadow_plane: bool;
+override culling: bool;
 
 // A receiver as a caster sees it.
 struct Receiver {
@@ -169,45 +178,82 @@ fn cssm_visibility(r: Receiver) -> f32 {
     return saturate((0.5 + series(cssm, linear_sampler, filtered, 0u, atlas_height, params.terms, d)) / lit);
 }
 
+// What is lit by no workgroup of `light`; a group a block.
 @compute @workgroup_size(8, 8)
-fn light(@builtin(global_invocation_id) id: vec3u) {
-    let size = textureDimensions(split_light);
-    if any(id.xy >= size) {
+fn clear(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    if surface_blocks[(group.z * groups.y + group.y) * groups.x + group.x].points > 0u {
         return;
     }
-    let surface = textureLoad(split_position, id.xy, 0);
-    var irradiance = vec3f(0.0);
-    var unshadowed = 0.0;
-    if surface.a > 0.0 {
-        let normal = unpack_unit(textureLoad(split_normal, id.xy, 0).x);
-        let tile = id.xy / (size / params.tiles);
-        let least_distance = params.vpl_clamp * scene_info.diagonal;
+    let tile = textureDimensions(split_light) / params.tiles;
+    if all(id.xy < tile) {
+        textureStore(split_light, corner_of_tile(group.z, tile, params.tiles) + id.xy, vec4f(0.0));
+    }
+}
+
+// Irradiance by light `c`, and in alpha its luminance without shadows.
+fn light_by(c: u32, position: vec3f, normal: vec3f) -> vec4f {
+    let cluster = clusters[c];
+    if cluster.state != CLUSTER_ACTIVE || cluster.count == 0u {
+        return vec4f(0.0);
+    }
+    let v = position - cluster.position;
+    let d2 = dot(v, v);
+    let direction = v * inverseSqrt(max(d2, 1e-30));
+    let cos_receiver = -dot(normal, direction);
+    let cos_light = dot(cluster.normal, direction);
+    if cos_receiver <= 0.0 || cos_light <= 0.0 {
+        return vec4f(0.0);
+    }
+    let least_distance = params.vpl_clamp * scene_info.diagonal;
+    let d2_kept = select(max(d2, least_distance * least_distance), d2, lights_is_val);
+    let e = cluster.flux * disk_form_factor(cos_receiver, cos_light, d2_kept, select(0.0, cluster.area, lights_is_val));
+    var visibility = 1.0;
+    if visibility_is_simple || visibility_is_pcss {
+        visibility = map_visibility(receiver(caster_of[c], position, normal));
+    } else if visibility_is_cssm {
+        visibility = cssm_visibility(receiver(caster_of[c], position, normal));
+    } else if visibility_is_exact {
         let lift = ray_offset(scene_info);
-        for (var c = tile.y * params.tiles + tile.x; c < arrayLength(&clusters); c += params.tiles * params.tiles) {
-            let cluster = clusters[c];
-            if cluster.state != CLUSTER_ACTIVE || cluster.count == 0u {
-                continue;
+        visibility = select(0.0, 1.0, visible(position + normal * lift, cluster.position + cluster.normal * lift));
+    }
+    return vec4f(e * visibility, luminance(e));
+}
+
+@compute @workgroup_size(8, 8)
+fn light(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_id) lane: vec3u) {
+    let place = group.x + group.y * groups.x;
+    if place >= lit_block_groups[0].w {
+        return;
+    }
+    let block = lit_blocks[place];
+    let n = params.tiles;
+    let tile = textureDimensions(split_light) / n;
+    let corner = vec2u(surface_blocks[block].first & 0xffffu, surface_blocks[block].first >> 16u);
+    let texel = corner + lane.xy;
+    // A block at the rim of its tile is cut there.
+    if any(corner % tile + lane.xy >= tile) {
+        return;
+    }
+    let surface = textureLoad(split_position, texel, 0);
+    var sum = vec4f(0.0);
+    if surface.a > 0.0 {
+        let normal = unpack_unit(textureLoad(split_normal, texel, 0).x);
+        let first = corner / tile;
+        let period = n * n;
+        let own_tile = first.y * n + first.x;
+        let lights = lights_of_tile(own_tile, arrayLength(&clusters), period);
+        let words = words_of_tile(arrayLength(&clusters), period);
+        for (var word = 0u; word < words; word++) {
+            var bits = full_word(word, lights);
+            if culling {
+                bits = block_lights[block * words + word];
             }
-            let v = surface.xyz - cluster.position;
-            let d2 = dot(v, v);
-            let direction = v * inverseSqrt(max(d2, 1e-30));
-            let cos_receiver = -dot(normal, direction);
-            let cos_light = dot(cluster.normal, direction);
-            if cos_receiver <= 0.0 || cos_light <= 0.0 {
-                continue;
-            }
-            let d2_kept = select(max(d2, least_distance * least_distance), d2, lights_is_val);
-            let e = cluster.flux * disk_form_factor(cos_receiver, cos_light, d2_kept, select(0.0, cluster.area, lights_is_val));
-            unshadowed += luminance(e);
-            if visibility_is_simple || visibility_is_pcss {
-                irradiance += e * map_visibility(receiver(caster_of[c], surface.xyz, normal));
-            } else if visibility_is_cssm {
-                irradiance += e * cssm_visibility(receiver(caster_of[c], surface.xyz, normal));
-            } else if !visibility_is_exact || visible(surface.xyz + normal * lift, cluster.position + cluster.normal * lift) {
-                irradiance += e;
+            while bits != 0u {
+                let j = 32u * word + countTrailingZeros(bits);
+                bits &= bits - 1u;
+                sum += light_by(own_tile + j * period, surface.xyz, normal);
             }
         }
     }
-    let scale = f32(params.tiles * params.tiles);
-    textureStore(split_light, id.xy, vec4f(irradiance, unshadowed) * scale);
+    textureStore(split_light, texel, sum * f32(n * n));
 }

@@ -4,6 +4,7 @@
 mod blocks;
 mod cli;
 mod clustering;
+mod culling;
 mod deforming;
 mod determinism;
 mod energy;

@@ -1,5 +1,6 @@
 //! Every function of `shaders/common`, called on the GPU with thousands of arguments and compared with a twin in 64 bits.
 
+mod culling;
 mod directions;
 mod harness;
 mod inputs;
@@ -31,6 +32,7 @@ fn cases() -> Vec<Case> {
         paths::cases(),
         surface::cases(),
         precomputed::cases(),
+        culling::cases(),
     ]
     .into_iter()
     .flatten()
@@ -86,6 +88,11 @@ const FAULTS: &[(&str, &str, &str)] = &[
     ("baked::is_between", "inverse += weights.x * weights.y", "inverse += weights.x"),
     ("baked::tap", "any(texel < vec2i(0)) || ", ""),
     ("baked::seen_light", "i / 3 - 1", "i / 3"),
+    ("bounds::form_factor_bounds", "- group.low + slack", "- group.high + slack"),
+    ("bounds::form_factor_bounds", "cosine_beside_cone(cosine, sine, group.spread, false)", "cosine"),
+    ("bounds::form_factor_bounds", "length(beyond) - slack", "length(beyond) + slack"),
+    ("bounds::cosine_beside_cone", "cosine >= cos_half", "cosine > 1.0"),
+    ("culling::full_word", "rest >= 32u", "rest > 32u"),
     ("view::pixel_solid_angle", "cosine * cosine * cosine", "cosine * cosine"),
 ];
 

@@ -18,6 +18,18 @@ use super::{
     Cluster, code, noise, pipeline,
 };
 
+/// The node that lists the blocks of receivers to be lit.
+const BLOCKS: &str = "(id: \"blocks\", node: \"lighting/blocks\", params: {\"tiles\": 1})";
+
+/// Of a row of receivers that stands for a picture.
+fn block_resources(receivers: usize) -> String {
+    let count = receivers.div_ceil(8);
+    format!(
+        "\"surface_blocks\": Buffer(of: \"SurfaceBounds\", count: {count}), \"lit_blocks\": Buffer(of: \"u32\", count: {count}),
+        \"lit_block_groups\": Buffer(of: \"vec4u\", count: 1)"
+    )
+}
+
 /// [ACRSM] 5.3.3, [PCSS], [VAL] eqs. 3 and 5.5: light of one disk behind what a map of 64² texels holds.
 #[test]
 fn soft_shadows_are_as_their_twin() {
@@ -88,10 +100,11 @@ fn soft_shadows_are_as_their_twin() {
             Resource::texture("ism", Format::R32Float, (256, SIDE as u32), &[texels]),
             Resource::uniform("scene_info", "SceneInfo", &info),
         ]);
+        world.add_node("lighting/blocks");
         world.add_node("lighting/indirect");
-        let resources = format!("\"split_light\": Texture(format: Rgba32Float, size: Fixed({COUNT}, 1))");
+        let resources = format!("\"split_light\": Texture(format: Rgba32Float, size: Fixed({COUNT}, 1)), {}", block_resources(COUNT));
         let nodes = format!(
-            "(id: \"indirect\", node: \"lighting/indirect\", params: {{\"tiles\": 1, \"ism_size\": {SIDE}, \"atlas_width\": 256, \"shadow_plane\": {plane}, \"shadow_bias\": {BIAS}}})"
+            "{BLOCKS}, (id: \"indirect\", node: \"lighting/indirect\", params: {{\"tiles\": 1, \"ism_size\": {SIDE}, \"atlas_width\": 256, \"shadow_plane\": {plane}, \"shadow_bias\": {BIAS}}})"
         );
         world.add("pipelines/test.ron", &pipeline(&resources, &nodes, "split_light"));
         let image = world.run("lighting/indirect", &[]).image("split_light");
@@ -164,16 +177,18 @@ fn series_of_a_map_are_as_their_twin() {
                 Resource::texture("ism", Format::R32Float, (256, SIDE as u32), &[vec![stored; 256 * SIDE]]),
                 Resource::uniform("scene_info", "SceneInfo", &info),
             ]);
+            world.add_node("lighting/blocks");
             world.add_node("lighting/indirect");
             world.add_node("cssm/basis");
             let resources = format!(
-                "\"split_light\": Texture(format: Rgba32Float, size: Fixed({COUNT}, 1)),
+                "{}, \"split_light\": Texture(format: Rgba32Float, size: Fixed({COUNT}, 1)),
                 \"cssm\": Texture(format: Rgba16Float, size: Fixed(256, {}), mips: Count(7))",
+                block_resources(COUNT),
                 SIDE as u32 * (2 * terms.div_ceil(2) + 1)
             );
             let shared = format!("\"terms\": {terms}, \"ism_size\": {SIDE}");
             let nodes = format!(
-                "(id: \"basis\", node: \"cssm/basis\", params: {{{shared}}}), (id: \"indirect\", node: \"lighting/indirect\",
+                "{BLOCKS}, (id: \"basis\", node: \"cssm/basis\", params: {{{shared}}}), (id: \"indirect\", node: \"lighting/indirect\",
                 params: {{{shared}, \"tiles\": 1, \"atlas_width\": 256, \"visibility\": \"cssm\", \"cssm_margin\": {MARGIN:?}, \"cssm_slope\": {slope:?}}})"
             );
             world.add("pipelines/test.ron", &pipeline(&resources, &nodes, "split_light"));
