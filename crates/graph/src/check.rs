@@ -77,9 +77,22 @@ pub fn check(pipeline: &Pipeline, registry: &Registry) -> Diagnostics {
             let mut changed = values.clone();
             changed.replace(name, value);
             for scene in extremes(&linked, &changed) {
-                let when = if scene.when.is_empty() { when.clone() } else { format!("{when} and {}", scene.when) };
-                attempt(&changed, scene.seen(), &when, worst);
+                attempt(&changed, scene.seen(), &and_also(&when, &scene), worst);
             }
+        }
+    }
+    let own = values.pipeline.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect::<Vec<_>>();
+    for rung in pipeline.rungs(&own, &[]).into_iter().skip(1).filter(|_| !linked.refusals_unclear) {
+        let mut changed = values.clone();
+        for (name, value) in &rung {
+            if let Some((name, _)) = pipeline.params.get_key_value(name) {
+                changed.replace(name, value.clone());
+            }
+        }
+        let listed: Vec<String> = rung.iter().map(|(name, value)| format!("`{name}` is `{value}`")).collect();
+        let when = format!("on the rung of `quality` where {}", listed.join(" and "));
+        for scene in extremes(&linked, &changed) {
+            attempt(&changed, scene.seen(), &and_also(&when, &scene), Severity::Error);
         }
     }
     if pipeline.gaps == Gaps::default() && !out.iter().any(|d| d.severity == Severity::Error) {
@@ -108,6 +121,10 @@ pub fn check_with_sources(library: &Library, path: impl AsRef<Path>, registry: &
         faults.extend(check(&pipeline, registry));
     }
     (faults.sorted(), sources)
+}
+
+fn and_also(when: &str, scene: &scenes::Tried) -> String {
+    if scene.when.is_empty() { when.to_owned() } else { format!("{when} and {}", scene.when) }
 }
 
 /// The sentence without the values in it.

@@ -11,6 +11,7 @@ use crate::{
     expr, format,
     params::{Literal, check_identifier, read_literal, read_params},
     pipeline::{Argument, ArgumentValue, Connection, Gaps, Mips, NodeUse, Preset, Refusal, Resource, ResourceKind, Size, ValueAt},
+    quality::{self, Quality},
     reader::{Reader, Shape, Spanned, head},
     registry::Param,
     render::suggest,
@@ -32,6 +33,7 @@ pub(crate) struct Document {
     pub resources: IndexMap<String, Resource>,
     pub nodes: Vec<NodeUse>,
     pub refuse: Vec<Refusal>,
+    pub quality: Option<Quality>,
     pub presents: Option<Spanned>,
     pub radiance: Option<Spanned>,
     pub gaps: Gaps,
@@ -40,10 +42,10 @@ pub(crate) struct Document {
 const PIPELINE: Shape = Shape {
     what: "Pipeline",
     required: &["doc"],
-    optional: &["extends", "set", "include", "params", "conditions", "resources", "nodes", "refuse", "presents", "radiance"],
+    optional: &["extends", "set", "include", "params", "conditions", "resources", "nodes", "refuse", "quality", "presents", "radiance"],
 };
 const STAGE: Shape =
-    Shape { what: "Stage", required: &["doc"], optional: &["include", "params", "conditions", "resources", "nodes", "refuse"] };
+    Shape { what: "Stage", required: &["doc"], optional: &["include", "params", "conditions", "resources", "nodes", "refuse", "quality"] };
 
 /// Reads a file; faults go to `out`.
 pub(crate) fn read(source: &Arc<Source>, stage: &str, out: &mut Vec<Diagnostic>) -> Option<Document> {
@@ -116,6 +118,7 @@ fn read_document(reader: &mut Reader, tree: &Tree, stage: &str) -> Option<Docume
             }
         }
     }
+    let quality = fields.get("quality").map(|t| quality::read(reader, t));
     let mut presents = text(reader, "presents", "the name of a resource in quotes");
     if presents.is_none() && fields.tried("presents") {
         // Reported already; it is not missing.
@@ -134,6 +137,7 @@ fn read_document(reader: &mut Reader, tree: &Tree, stage: &str) -> Option<Docume
         resources,
         nodes,
         refuse,
+        quality,
         presents,
         radiance,
         gaps,

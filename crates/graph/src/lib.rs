@@ -31,6 +31,7 @@
 //! | [`shader`] | composed WGSL and what reflection says of it |
 //! | [`value`], [`params`], [`expr`], [`condition`], [`features`] | formats and descriptions, parameters, sizes, conditions |
 //! | [`pipeline`] | documents with `extends` and `include` carried out |
+//! | [`quality`] | what a pipeline gives up, rung after rung, to hold a time |
 //! | [`check`] | all that can be known without a scene |
 //! | [`planner`], [`plan`] | from a pipeline to what will run |
 //! | [`mod@draw`] | plans as DOT, Mermaid, JSON and SVG |
@@ -62,6 +63,7 @@ pub mod params;
 pub mod pipeline;
 pub mod plan;
 pub mod planner;
+pub mod quality;
 mod reader;
 pub mod reference;
 mod reflect;

@@ -10,6 +10,7 @@ use crate::{
     document::{self, Document},
     library::{Library, ReadError, stem},
     pipeline::{Gaps, NodeUse, Pipeline, Preset, Refusal, Resource},
+    quality::Quality,
     reader::Spanned,
     registry::Param,
     render::and_also,
@@ -62,6 +63,7 @@ struct Layer {
     resources: IndexMap<String, Resource>,
     nodes: IndexMap<String, NodeUse>,
     refuse: Vec<Refusal>,
+    quality: Option<Quality>,
     presents: Option<Spanned>,
     radiance: Option<Spanned>,
     gaps: Gaps,
@@ -111,6 +113,8 @@ impl Loader<'_> {
                 continue;
             }
             match self.file(&source, path.as_deref(), true) {
+                // An order over everything is best said by who has everything: its own ladder replaces those of stages.
+                Some(stage) if document.quality.is_some() => self.join(&mut own, Layer { quality: None, ..stage }),
                 Some(stage) => self.join(&mut own, stage),
                 None => own.gaps.files = true,
             }
@@ -171,14 +175,23 @@ impl Loader<'_> {
             self.insert(&mut own.nodes, id, node, "node", |n| n.id.span.clone(), span);
         }
         own.refuse.extend(stage.refuse);
+        match (&own.quality, stage.quality) {
+            (Some(first), Some(second)) => self.out.push(
+                Diagnostic::error("there are two ladders of quality", second.span)
+                    .and(first.span.clone(), "the other one")
+                    .help("give the file that includes both a `quality` of its own, which replaces them"),
+            ),
+            (None, second) => own.quality = second,
+            (Some(_), None) => {}
+        }
         // What was given twice was left out once.
         own.gaps.nodes |= self.out.len() > before;
     }
 
     fn join_document(&mut self, own: &mut Layer, document: Document) {
-        let Document { doc, head, set, params, conditions, resources, nodes, refuse, presents, radiance, gaps, .. } = document;
+        let Document { doc, head, set, params, conditions, resources, nodes, refuse, quality, presents, radiance, gaps, .. } = document;
         let mut layer =
-            Layer { doc, head: Some(head), params, conditions, resources, refuse, presents, radiance, gaps, ..Layer::default() };
+            Layer { doc, head: Some(head), params, conditions, resources, refuse, quality, presents, radiance, gaps, ..Layer::default() };
         layer.set.extend(set);
         let before = self.out.len();
         for node in nodes {
@@ -215,7 +228,7 @@ impl Loader<'_> {
 impl Layer {
     /// Lays another over this one: what it gives wins.
     fn overlay(&mut self, over: Self) {
-        let Self { doc, head, params, conditions, set, resources, nodes, refuse, presents, radiance, gaps } = over;
+        let Self { doc, head, params, conditions, set, resources, nodes, refuse, quality, presents, radiance, gaps } = over;
         self.doc = doc;
         self.head = head;
         self.params.extend(params);
@@ -224,13 +237,14 @@ impl Layer {
         self.resources.extend(resources);
         self.nodes.extend(nodes);
         self.refuse.extend(refuse);
+        self.quality = quality.or(self.quality.take());
         self.presents = presents.or(self.presents.take());
         self.radiance = radiance.or(self.radiance.take());
         self.gaps.extend(gaps);
     }
 
     fn finish(self, name: String, sources: Vec<Arc<Source>>, out: &mut Vec<Diagnostic>) -> Option<Pipeline> {
-        let Self { doc, head, params, conditions, set, resources, nodes, refuse, presents, radiance, gaps } = self;
+        let Self { doc, head, params, conditions, set, resources, nodes, refuse, quality, presents, radiance, gaps } = self;
         let Some(presents) = presents else {
             if !gaps.files {
                 let fault = Diagnostic::error("missing field `presents` in Pipeline", head?);
@@ -238,6 +252,6 @@ impl Layer {
             }
             return None;
         };
-        Some(Pipeline { name, doc, params, conditions, set, resources, nodes, refuse, presents, radiance, sources, gaps })
+        Some(Pipeline { name, doc, params, conditions, set, resources, nodes, refuse, quality, presents, radiance, sources, gaps })
     }
 }

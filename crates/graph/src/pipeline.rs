@@ -9,6 +9,7 @@ use crate::{
     diagnostics::{Source, Span},
     expr::ExprAt,
     params::Literal,
+    quality::Quality,
     reader::Spanned,
     registry::Param,
     value::{Encoding, Format},
@@ -33,6 +34,8 @@ pub struct Pipeline {
     pub nodes: IndexMap<String, NodeUse>,
     /// Combinations of values that make no sense, those of extended and included files first.
     pub refuse: Vec<Refusal>,
+    /// What it gives up to hold a time, if it says so.
+    pub quality: Option<Quality>,
     /// The resource to show.
     pub presents: Spanned,
     /// The resource with linear radiance.

@@ -237,4 +237,15 @@ impl Plan {
     pub fn param(&self, name: &str) -> Option<&Value> {
         self.params.iter().find(|(known, _)| known == name).map(|(_, value)| value)
     }
+
+    /// Whether the same nodes run with the same parameters on the same resources, whatever parameters of the pipeline differ that nothing reads.
+    pub fn same_work(&self, other: &Self) -> bool {
+        let same = |(a, b): (&PlanNode, &PlanNode)| {
+            (&a.id, &a.decl.name, &a.bindings, &a.params, &a.steps, a.settles)
+                == (&b.id, &b.decl.name, &b.bindings, &b.params, &b.steps, b.settles)
+        };
+        self.nodes.len() == other.nodes.len()
+            && self.nodes.iter().zip(&other.nodes).all(same)
+            && (&self.resources, self.presents, self.radiance) == (&other.resources, other.presents, other.radiance)
+    }
 }

@@ -13,6 +13,7 @@ use crate::{
     diagnostics::{Diagnostic, Span},
     fit,
     pipeline::{Connection, Mips, NodeUse, Pipeline, ResourceKind},
+    quality,
     registry::{Direction, NodeDecl, Port, Registry, Repeat, Step},
     render::{nearest, suggest},
     value::Value,
@@ -119,6 +120,7 @@ pub(crate) fn link<'a>(pipeline: &'a Pipeline, registry: &'a Registry, features:
     let nodes: Vec<_> = pipeline.nodes.values().map(|node| linker.node(node)).collect();
     linker.presets(&nodes);
     let refusals_unclear = linker.refusals();
+    linker.out.extend(quality::faults(pipeline));
     linker.never_written(&nodes);
     linker.shown();
     let Linker { incomplete, tainted, .. } = linker;

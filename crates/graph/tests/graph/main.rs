@@ -11,6 +11,7 @@ mod merging;
 mod nodes;
 mod pipelines;
 mod plans;
+mod quality;
 mod refusals;
 mod reload;
 mod text;
