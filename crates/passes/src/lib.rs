@@ -20,6 +20,7 @@
 //! - [`renderer`]: [`Renderer`], the library's front door: render, read, reload.
 //! - [`documents`]: a library with its nodes and a pipeline; plans without a GPU.
 //! - [`atlas`]: the texels of an atlas over the surfaces of a scene.
+//! - [`budget`]: a frame time that is held by giving up quality.
 //! - [`baked`]: precomputed indirect light, its file and its weights.
 //! - [`externals`]: scene and frame data as pipelines see them.
 //! - [`host`]: the nodes that are written in Rust.
@@ -27,6 +28,7 @@
 
 pub mod atlas;
 pub mod baked;
+pub mod budget;
 mod bvh;
 pub mod documents;
 pub mod externals;
@@ -36,6 +38,7 @@ pub mod renderer;
 pub mod scene_source;
 
 pub use baked::Baked;
+pub use budget::Budget;
 pub use documents::{Documents, load_registry};
 pub use host::HostScene;
 pub use renderer::{ReloadReport, RenderError, Renderer, Settings, plan_input};

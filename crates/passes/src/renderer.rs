@@ -78,6 +78,8 @@ pub struct Renderer {
     last_time: Option<f64>,
     /// Frames run before the last restart.
     first: u64,
+    /// Frames run before the plan was made.
+    built_at: u64,
 }
 
 /// A scene with its data on the GPU.
@@ -200,7 +202,7 @@ impl Renderer {
         check_baked(&plan, &settings, &scene.host.scene)?;
         scene.upload(gpu, settings.size, &gpu_data::Frame { seed: settings.seed, ..Default::default() })?;
         let (frame, _) = build(gpu, &plan, &scene, &hosts, None, &settings)?;
-        Ok(Self { gpu: gpu.clone(), documents, hosts, settings, scene, frame, last_time: None, first: 0 })
+        Ok(Self { gpu: gpu.clone(), documents, hosts, settings, scene, frame, last_time: None, first: 0, built_at: 0 })
     }
 
     /// The same pipeline, scene and settings on another device, from its first frame: for when the device was lost.
@@ -299,6 +301,19 @@ impl Renderer {
     /// What runs.
     pub fn plan(&self) -> &Plan {
         self.frame.plan()
+    }
+
+    /// What would run under other settings; needs no GPU and changes nothing.
+    ///
+    /// # Errors
+    /// The settings do not fit the pipeline, or it refuses them.
+    pub fn plan_for(&self, settings: &Settings) -> Result<Plan, Diagnostics> {
+        self.documents.plan(&plan_input(settings, self.scene()))
+    }
+
+    /// Index of the first frame of the plan, in which every node runs: with each change of documents, scene or settings a later one.
+    pub fn built_at(&self) -> u64 {
+        self.built_at
     }
 
     /// The frame, for those who draw its textures elsewhere.
@@ -422,6 +437,7 @@ impl Renderer {
         let on_gpu = new_scene.as_ref().unwrap_or(&self.scene);
         let (frame, build) = build(&self.gpu, &plan, on_gpu, &self.hosts, Some(&self.frame), new_settings)?;
         self.frame = frame;
+        self.built_at = self.frame.index();
         let scene_changed = new_scene.is_some();
         if let Some(scene) = new_scene {
             self.scene = scene;
