@@ -2,6 +2,7 @@
 //! One binary, so that the workspace links once.
 
 mod blocks;
+mod budget;
 mod cli;
 mod clustering;
 mod culling;

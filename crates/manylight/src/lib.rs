@@ -26,6 +26,7 @@
 //!
 //! - [`library`]: the embedded shaders, pipelines and scenes, and where files on disk are found.
 //! - [`renderer`] and [`documents`]: render, read, reload (from `manylight-passes`).
+//! - [`budget`]: a frame time that is held by giving up quality.
 //! - [`files`]: EXR and PNG files, written whole or not at all; [`tone`]: from numbers to bytes to look at.
 //! - [`metrics`]: how far a picture is from a reference.
 //! - [`fault`]: what ends a command early, with its exit code.
@@ -44,5 +45,5 @@ pub use manylight_lab::{files, metrics, tone};
 
 pub use manylight_gpu::{Gpu, GpuOptions, Image};
 pub use manylight_passes::{
-    Documents, ReloadReport, RenderError, Renderer, SceneSource, Settings, documents, load_registry, plan_input, renderer,
+    Budget, Documents, ReloadReport, RenderError, Renderer, SceneSource, Settings, budget, documents, load_registry, plan_input, renderer,
 };

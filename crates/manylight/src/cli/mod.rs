@@ -1,12 +1,14 @@
 //! The command line: subcommands, options and their help.
 
 mod bake;
+mod budget;
 mod lab;
 pub mod values;
 
 use std::path::PathBuf;
 
 pub use bake::{BakeArgs, CriterionArg, LookupArg};
+pub use budget::{BudgetArgs, BudgetTimeArgs};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 pub use lab::{LabArgs, SweepArgs, TuneArgs};
 
@@ -144,6 +146,9 @@ pub struct RenderArgs {
     /// Frames to render; the last is written. Iterative clustering needs some to settle
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub frames: u32,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub budget: BudgetArgs,
     /// Write the last frame: .png as presented, .exr as linear radiance before tone mapping (repeatable)
     #[arg(long, value_name = "FILE")]
     pub out: Vec<PathBuf>,
@@ -271,6 +276,9 @@ pub struct ProfileArgs {
     /// Frames to render first that are not measured
     #[arg(long, value_name = "N", default_value_t = 4)]
     pub warm_up: u32,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub budget: BudgetArgs,
     /// Measure frames as they are in a window: nodes whose inputs are as they were are skipped. Without it every node runs in every frame
     #[arg(long)]
     pub skip_unchanged: bool,
@@ -303,6 +311,9 @@ pub struct WatchArgs {
     /// Picture to write: .png as presented, .exr as linear radiance (repeatable)
     #[arg(long, value_name = "FILE", required = true)]
     pub out: Vec<PathBuf>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub budget: BudgetTimeArgs,
     /// End after this many pictures instead of running until Ctrl+C (for scripts)
     #[arg(long, value_name = "N")]
     pub pictures: Option<u32>,

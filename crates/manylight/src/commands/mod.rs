@@ -2,6 +2,7 @@
 
 pub mod adapters;
 pub mod bake;
+mod budget;
 pub mod check;
 pub mod compare;
 pub mod explain;

@@ -1,7 +1,7 @@
 //! `manylight profile`: what each node costs.
 
 use manylight::{
-    Settings,
+    Budget, Settings,
     fault::Fault,
     files::{FileKind, check_writable},
     lab::{
@@ -13,7 +13,7 @@ use manylight::{
 use serde_json::json;
 
 use super::{
-    adapter_line,
+    adapter_line, budget,
     costs::{Times, has_switches},
     of_file,
     session::{Session, of_render, settings, time_of},
@@ -35,6 +35,7 @@ pub fn run(cli: &Cli, args: &ProfileArgs) -> Result<(), Fault> {
             return Err(Fault::Usage(format!("`{}`: --trace writes a .json file", file.display())));
         }
     }
+    budget::check(&args.budget)?;
     let session = Session::open(cli, &args.pipeline.pipeline)?;
     let scene = session.scene(&args.frame.scene)?;
     let settings = Settings { skip_unchanged: args.skip_unchanged, ..settings(&args.pipeline, &args.frame, Vec::new())? };
@@ -45,17 +46,50 @@ pub fn run(cli: &Cli, args: &ProfileArgs) -> Result<(), Fault> {
         renderer.render_frame(time_of(&args.frame, frame.into())).map_err(of_render)?;
         renderer.wait_timings();
     }
+    let mut number = u64::from(args.warm_up);
+    let budget = budget::open(&args.budget, &renderer)?;
+    let budget = budget.map(|budget| steer(&mut renderer, args, budget, &mut number)).transpose()?;
     let mut trace = args.trace.as_ref().map(|_| Trace::start()).transpose()?;
-    let samples = measure(&mut renderer, args, trace.as_mut())?;
+    let samples = measure(&mut renderer, args, number, trace.as_mut())?;
     if let (Some(trace), Some(file)) = (trace, &args.trace) {
         trace.write(file)?;
     }
-    let states = node_states(&mut renderer, args, &samples, u64::from(args.warm_up) + u64::from(args.frames))?;
+    let states = node_states(&mut renderer, args, &samples, number + u64::from(args.frames))?;
     match args.format {
-        TextOrJson::Text => super::print(&text(&renderer, args, &samples, &states)),
-        TextOrJson::Json => super::print(&format!("{:#}\n", report(&renderer, args, &samples, &states))),
+        TextOrJson::Text => {
+            let budget = budget.as_ref().map_or_else(String::new, |budget| format!("\n{}", budget::text(budget)));
+            super::print(&format!("{}{budget}", text(&renderer, args, &samples, &states)))
+        }
+        TextOrJson::Json => {
+            let mut report = report(&renderer, args, &samples, &states);
+            if let Some(budget) = &budget {
+                report["budget"] = budget::to_json(budget);
+            }
+            super::print(&format!("{report:#}\n"))
+        }
     }
 }
+
+/// Renders until the budget has found its rung: that is what is measured then.
+fn steer(renderer: &mut Renderer, args: &ProfileArgs, mut budget: Budget, number: &mut u64) -> Result<Budget, Fault> {
+    let spinner = progress::spinner("looking for the rung that holds the budget");
+    let mut frames = 0;
+    while !budget.is_settled() && frames < MOST_STEERED {
+        let (_, wall_ms) = timed_frame(renderer, time_of(&args.frame, *number)).map_err(of_render)?;
+        budget::follow(&mut budget, renderer, Some(wall_ms));
+        *number += 1;
+        frames += 1;
+    }
+    spinner.finish_and_clear();
+    if !budget.is_settled() {
+        super::note(&format!("the budget has not settled within {MOST_STEERED} frames: the load varies"));
+    }
+    budget::write_trace(&args.budget, &budget)?;
+    Ok(budget)
+}
+
+/// Frames after which a budget that has not settled is left as it is.
+const MOST_STEERED: u32 = 1000;
 
 /// Whether nodes are submitted one by one.
 fn is_serial(renderer: &Renderer, args: &ProfileArgs) -> bool {
@@ -67,7 +101,7 @@ fn is_serial(renderer: &Renderer, args: &ProfileArgs) -> bool {
 }
 
 /// Measures ordinary frames; when nodes are timed serially, as many more for the nodes.
-fn measure(renderer: &mut Renderer, args: &ProfileArgs, mut trace: Option<&mut Trace>) -> Result<FrameSamples, Fault> {
+fn measure(renderer: &mut Renderer, args: &ProfileArgs, mut number: u64, mut trace: Option<&mut Trace>) -> Result<FrameSamples, Fault> {
     let mut samples = FrameSamples::new(renderer.plan());
     if let Some(trace) = &mut trace {
         trace.plan(renderer.plan());
@@ -75,7 +109,6 @@ fn measure(renderer: &mut Renderer, args: &ProfileArgs, mut trace: Option<&mut T
     let serial = is_serial(renderer, args);
     let rounds: &[bool] = if serial { &[false, true] } else { &[false] };
     let bar = progress::bar(rounds.len() as u64 * u64::from(args.frames), "measuring");
-    let mut number = u64::from(args.warm_up);
     for &one_by_one in rounds {
         renderer.measure_serially(one_by_one);
         for _ in 0..args.frames {

@@ -1,6 +1,7 @@
 //! `manylight render`: frames of a scene, the last one written.
 
 use manylight::{
+    Budget,
     fault::Fault,
     files::{FileKind, write_text},
     lab::{
@@ -12,7 +13,7 @@ use manylight::{
 use serde_json::{Value, json};
 
 use super::{
-    of_file,
+    budget, note, of_file,
     outputs::Outputs,
     session::{Session, bad_numbers, settings, time_of},
     stats,
@@ -36,11 +37,19 @@ pub fn run(cli: &Cli, args: &RenderArgs) -> Result<(), Fault> {
     let spinner = progress::spinner("compiling shaders");
     let mut renderer = session.renderer(&gpu, scene, settings)?;
     spinner.finish_and_clear();
-    let (samples, bad_numbers) = frames(&mut renderer, args)?;
+    let mut budget = budget::open(&args.budget, &renderer)?;
+    let (samples, bad_numbers) = frames(&mut renderer, args, budget.as_mut())?;
     outputs.write(&renderer)?;
     if let Some(file) = &args.stats {
-        let stats = stats(&renderer, args, &samples)?;
+        let mut stats = stats(&renderer, args, &samples)?;
+        if let Some(budget) = &budget {
+            stats["budget"] = budget::to_json(budget);
+        }
         write_text(file, &format!("{stats:#}\n")).map_err(of_file)?;
+    }
+    if let Some(budget) = &budget {
+        note(&budget::text(budget));
+        budget::write_trace(&args.budget, budget)?;
     }
     bad_numbers.map_or(Ok(()), Err)
 }
@@ -50,6 +59,7 @@ fn check(args: &RenderArgs, outputs: &Outputs) -> Result<(), Fault> {
         return Err(Fault::Usage("there is nothing to write: give --out FILE, --dump RESOURCE=FILE or --stats FILE.json".to_owned()));
     }
     outputs.check_files(args.stats.as_deref())?;
+    budget::check(&args.budget)?;
     match &args.stats {
         Some(file) if !matches!(FileKind::of(file), Ok(FileKind::Json)) => {
             Err(Fault::Usage(format!("`{}`: --stats writes a .json file", file.display())))
@@ -59,7 +69,7 @@ fn check(args: &RenderArgs, outputs: &Outputs) -> Result<(), Fault> {
 }
 
 /// Renders all frames, or until one has bad numbers.
-fn frames(renderer: &mut Renderer, args: &RenderArgs) -> Result<(FrameSamples, Option<Fault>), Fault> {
+fn frames(renderer: &mut Renderer, args: &RenderArgs, mut budget: Option<&mut Budget>) -> Result<(FrameSamples, Option<Fault>), Fault> {
     let (mut samples, mut found) = (FrameSamples::new(renderer.plan()), None);
     let bar = progress::bar(args.frames.into(), "rendering");
     // Where timestamps say nothing of single nodes, every other frame is measured node by node; the picture is the same.
@@ -79,6 +89,12 @@ fn frames(renderer: &mut Renderer, args: &RenderArgs) -> Result<(FrameSamples, O
         }
         if one_by_one == serial {
             samples.push_nodes(timings);
+        }
+        // Frames measured node by node take longer. Another rung has other nodes, and times of its own.
+        if let Some(budget) = budget.as_deref_mut().filter(|_| !one_by_one)
+            && budget::follow(budget, renderer, Some(wall_ms))
+        {
+            samples = FrameSamples::new(renderer.plan());
         }
         bar.inc(1);
     }

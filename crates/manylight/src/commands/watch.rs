@@ -6,13 +6,16 @@ use std::{
 };
 
 use manylight::{
+    Budget,
     fault::Fault,
     gpu::Watcher,
+    graph::diagnostics::Diagnostics,
+    lab::timing::timed_frame,
     renderer::{ReloadReport, Renderer},
 };
 
 use super::{
-    note,
+    budget, note,
     outputs::Outputs,
     session::{Session, bad_numbers, of_render, settings, time_of},
 };
@@ -53,13 +56,16 @@ fn open<'a>(cli: &Cli, args: &'a WatchArgs) -> Result<Watch<'a>, Fault> {
     outputs.check_plan(&session.plan(Some(&scene), &settings)?)?;
     let gpu = super::open_gpu(args.frame.adapter.as_ref())?;
     let renderer = session.renderer(&gpu, scene, settings)?;
-    Ok(Watch { args, outputs, renderer, frame: 0, pictures: 0 })
+    let budget = args.budget.budget.map(|ms| Budget::new(ms, &renderer)).transpose()?;
+    Ok(Watch { args, outputs, renderer, budget, frame: 0, pictures: 0 })
 }
 
 struct Watch<'a> {
     args: &'a WatchArgs,
     outputs: Outputs,
     renderer: Renderer,
+    /// Holds the time, while the pipeline has what it can give up.
+    budget: Option<Budget>,
     /// Frames rendered so far.
     frame: u64,
     /// Changes that led to a picture.
@@ -73,9 +79,17 @@ impl Watch<'_> {
 
     fn picture(&mut self, frames: u32) -> Result<(), Fault> {
         for _ in 0..frames {
-            let rendered = self.renderer.render_frame(time_of(&self.args.frame, self.frame));
+            let (time, mut wall_ms) = (time_of(&self.args.frame, self.frame), None);
+            let rendered = if self.budget.is_some() && !self.renderer.gpu().has_timestamps() {
+                timed_frame(&mut self.renderer, time).map(|(_, ms)| wall_ms = Some(ms))
+            } else {
+                self.renderer.render_frame(time)
+            };
             if let Some(fault) = bad_numbers(rendered)? {
                 note(&fault.render());
+            }
+            if let Some(budget) = &mut self.budget {
+                budget::follow(budget, &mut self.renderer, wall_ms);
             }
             self.frame += 1;
         }
@@ -93,6 +107,7 @@ impl Watch<'_> {
             match super::open_gpu(self.args.frame.adapter.as_ref()) {
                 Ok(gpu) => {
                     self.renderer = self.renderer.on(&gpu).map_err(of_render)?;
+                    self.hold();
                     return Ok(());
                 }
                 Err(fault) => last = Some(fault),
@@ -112,6 +127,35 @@ impl Watch<'_> {
         }
     }
 
+    /// Reads changed files. What a rung sets may be gone from them: then once more without it.
+    fn reload(&mut self, changed: &[PathBuf]) -> Result<ReloadReport, Diagnostics> {
+        let reloaded = self.renderer.reload(changed);
+        match (&reloaded, &self.budget) {
+            (Err(_), Some(budget)) if budget.rung() > 0 => {
+                budget.first_rung(&mut self.renderer)?;
+                let again = self.renderer.reload(changed);
+                if again.is_err() {
+                    budget.this_rung(&mut self.renderer)?;
+                }
+                again
+            }
+            _ => reloaded,
+        }
+    }
+
+    /// Holds the budget with what is loaded now.
+    fn hold(&mut self) {
+        let Some(ms) = self.args.budget.budget else { return };
+        let held = match &mut self.budget {
+            Some(budget) => budget.reconsider(&mut self.renderer),
+            None => Budget::new(ms, &self.renderer).map(|budget| self.budget = Some(budget)),
+        };
+        if let Err(faults) = held {
+            self.budget = None;
+            note(&format!("{}\nthe budget is not held", faults.render().trim_end()));
+        }
+    }
+
     /// Takes over a change: the picture is written after one frame, and again when the iterative parts have settled. What fails is told: the next
     /// change may mend it.
     fn follow(&mut self, changed: &[PathBuf]) {
@@ -125,13 +169,14 @@ impl Watch<'_> {
         let names: Vec<String> = changed.iter().map(|path| shown(path)).collect();
         note(&format!("changed: {}", names.join(", ")));
         self.recover()?;
-        let report = match self.renderer.reload(changed) {
+        let report = match self.reload(changed) {
             Ok(report) => report,
             Err(faults) => {
                 note(&format!("{}\nthe last good frame is kept", faults.render().trim_end()));
                 return Ok(());
             }
         };
+        self.hold();
         self.outputs.check_plan(self.renderer.plan())?;
         self.picture_or_recover(1)?;
         let took = saved.elapsed().unwrap_or(report.took);
