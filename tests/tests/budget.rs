@@ -128,13 +128,31 @@ fn nothing_waits_for_times() {
 #[test]
 fn profile_tells_what_a_budget_came_to() {
     let run = manylight(&[&["profile", "acrsm", "--frames", "2", "--warm-up", "1", "--budget", "0.001ms"][..], SMALL].concat()).expect(0);
-    run.says(&["budget of 0.001 ms: not held: this is the cheapest rung", "on the first rung", "clusters 64 → 32"]);
+    run.says(&[
+        "budget of 0.001 ms: not held: this is the cheapest rung",
+        "on the first rung",
+        "clusters 64 → 32",
+        "skipping unchanged nodes",
+    ]);
     let json = ["profile", "acrsm", "--frames", "2", "--warm-up", "1", "--budget", "1000s", "--format", "json"];
     let report: Value = serde_json::from_str(&manylight(&[&json[..], SMALL].concat()).expect(0).stdout).expect("JSON");
     assert_eq!(
         (&report["budget"]["rung"], &report["budget"]["held"], &report["budget"]["settled"]),
         (&json!(0), &json!(true), &json!(true))
     );
+    assert_eq!(report["memory"]["skipping"]["on"], false);
+    assert!(report["memory"]["skipping"]["bytes"].as_u64().is_some_and(|bytes| bytes > 0), "{:#}", report["memory"]["skipping"]);
+}
+
+/// What skipping takes is the same whether it is told beforehand or afterwards.
+#[test]
+fn memory_for_skipping_is_what_sharing_saves() {
+    let job = |skip_unchanged| Job { skip_unchanged, ..Job::asset("cornell").small() };
+    let (shared, skipping) = (job(false).renderer(), job(true).renderer());
+    let report = shared.memory_report();
+    assert_eq!(shared.memory_for_skipping(), report.pool_unshared - report.pool);
+    assert_eq!(skipping.memory_for_skipping(), shared.memory_for_skipping());
+    assert_eq!(skipping.memory_report().total() - report.total(), shared.memory_for_skipping());
 }
 
 #[test]

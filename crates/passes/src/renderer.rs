@@ -9,13 +9,13 @@ use std::{
 
 use manylight_gpu::{
     BuildOptions, BuildReport, Externals, Fault, Frame, FrameTimings, Gpu, HostData, HostNodes, Image, MemoryReport, ReadError, RunError,
-    Subresource, WatchSet,
+    Subresource, WatchSet, format::byte_size, memory::Holding,
 };
 use manylight_graph::{
     diagnostics::{Diagnostic, Diagnostics},
     library::Library,
     pipeline::Pipeline,
-    plan::{Debug, Plan, PlanInput},
+    plan::{Debug, Lifetime, Plan, PlanInput},
 };
 use manylight_scene::{Scene, gpu_data};
 
@@ -308,7 +308,7 @@ impl Renderer {
     /// # Errors
     /// The settings do not fit the pipeline, or it refuses them.
     pub fn plan_for(&self, settings: &Settings) -> Result<Plan, Diagnostics> {
-        self.documents.plan(&plan_input(settings, self.scene()))
+        self.documents.plan(&plan_input(self.pipeline(), settings, self.scene()))
     }
 
     /// Index of the first frame of the plan, in which every node runs: with each change of documents, scene or settings a later one.
@@ -354,6 +354,19 @@ impl Renderer {
     /// Memory of the frame by resource.
     pub fn memory_report(&self) -> MemoryReport {
         self.frame.memory_report()
+    }
+
+    /// Bytes that [`Settings::skip_unchanged`] takes, or would take: what sharing memory saves, which it forgoes.
+    pub fn memory_for_skipping(&self) -> u64 {
+        let report = self.frame.memory_report();
+        let settings = Settings { skip_unchanged: false, debug: Debug { no_reuse: false, ..self.settings.debug }, ..self.settings.clone() };
+        let Ok(shared) = self.plan_for(&settings) else { return 0 };
+        let pooled = |name: &str| report.resources.iter().any(|r| r.name == name && matches!(r.holding, Holding::Pool { .. }));
+        let slots = shared.resources.iter().filter(|r| pooled(&r.name)).filter_map(|r| match r.lifetime {
+            Lifetime::Transient { slot, .. } => Some((slot, byte_size(&r.desc))),
+            _ => None,
+        });
+        report.pool_unshared - slots.collect::<BTreeMap<_, _>>().values().sum::<u64>().min(report.pool_unshared)
     }
 
     /// What to watch: `shaders/` and `pipelines/` of the library's root, the pipeline's documents, the scene's files.

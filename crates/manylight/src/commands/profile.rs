@@ -267,8 +267,14 @@ fn memory_table(renderer: &Renderer) -> String {
         table.row(vec![r.name.clone(), bytes(r.bytes), stats::holding(r.holding)]);
     }
     let shared = report.pool_unshared.saturating_sub(report.pool);
+    let skipping = bytes(renderer.memory_for_skipping());
+    let skipping = if renderer.settings().skip_unchanged {
+        format!("skipping unchanged nodes keeps {skipping} that could be shared; `--no-skipping` shares them")
+    } else {
+        format!("skipping unchanged nodes (`--skip-unchanged`) would take {skipping} more, since nothing is shared then")
+    };
     format!(
-        "{}total {} (pool {}, of which sharing saves {}; histories {}, kept {}, host {}), besides externals of {}\n",
+        "{}total {} (pool {}, of which sharing saves {}; histories {}, kept {}, host {}), besides externals of {}\n{skipping}\n",
         table.render(),
         bytes(report.total()),
         bytes(report.pool),

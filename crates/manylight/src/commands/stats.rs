@@ -27,6 +27,7 @@ pub fn memory(renderer: &Renderer) -> Value {
         "total": report.total(),
         "pool": report.pool,
         "pool_unshared": report.pool_unshared,
+        "skipping": {"on": renderer.settings().skip_unchanged, "bytes": renderer.memory_for_skipping()},
         "history": report.history,
         "kept": report.kept,
         "host": report.host,
