@@ -81,7 +81,8 @@ impl<'a> Subject<'a> {
                     let is_count = name.ends_with("_count");
                     let small = usual.min(if is_count { SMALL_COUNT } else { SMALL }).max(*min);
                     let mut values = vec![small.to_string()];
-                    values.extend((!is_count && small > *min).then(|| min.to_string()));
+                    // A greatest factor of tessellation below the least is a fault of its own, whatever the rest is.
+                    values.extend((!is_count && small > *min && name != "f_max").then(|| min.to_string()));
                     numbers.push(factor(values));
                 }
                 ParamKind::Float { .. } => {}
