@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Paths a pixel and frame: so many are spread evenly over each pixel.
-const PATHS: i64 = 16;
+const PATHS: i64 = 8;
 
 struct Case {
     scene: PathBuf,

@@ -178,8 +178,11 @@ const SWEEP: Shape = Shape {
         "small",
     ],
 };
-const SMALL: Shape =
-    Shape { what: "the small size", required: &[], optional: &["scenes", "sizes", "seeds", "frames", "measure", "sequence", "paths"] };
+const SMALL: Shape = Shape {
+    what: "the small size",
+    required: &[],
+    optional: &["scenes", "sizes", "seeds", "frames", "measure", "sequence", "paths", "set"],
+};
 const VARIANT: Shape = Shape { what: "a variant", required: &["pipeline"], optional: &["set", "vary", "frames", "image"] };
 const SCENE: Shape = Shape { what: "a scene", required: &["scene"], optional: &["reference", "standard_error"] };
 const REFERENCE: Shape = Shape { what: "the reference", required: &[], optional: &["component", "paths"] };
@@ -204,6 +207,8 @@ struct Extent {
     measure: Option<u32>,
     sequence: Option<Sequence>,
     paths: Option<u32>,
+    /// Values in every variant, instead of its own and of those of knobs.
+    set: Vec<(String, Preset)>,
 }
 
 impl Sweep {
@@ -249,6 +254,7 @@ fn read_sweep(reader: &mut Reader, tree: &Tree, small: bool) -> Option<Sweep> {
     let lesser = lesser.map(|fields| {
         let mut extent = read_extent(reader, &fields);
         extent.paths = count(reader, &fields, "paths", MOST_PATHS);
+        extent.set = fields.get("set").map(|tree| read_set(reader, tree)).unwrap_or_default();
         extent
     });
     let reference = read_reference(reader, &fields);
@@ -301,7 +307,15 @@ fn read_sweep(reader: &mut Reader, tree: &Tree, small: bool) -> Option<Sweep> {
     };
     if small {
         let zips = sweep.variants.iter_mut().flat_map(|variant| &mut variant.vary).chain(&mut sweep.vary);
-        zips.flat_map(|zip| &mut zip.0).for_each(|knob| knob.values.truncate(SMALL_VALUES));
+        let is_set = |name: &str| chosen.set.iter().any(|(other, _)| other == name);
+        for zip in zips {
+            zip.0.retain(|knob| !is_set(&knob.name));
+            zip.0.iter_mut().for_each(|knob| knob.values.truncate(SMALL_VALUES));
+        }
+        for variant in &mut sweep.variants {
+            variant.set.retain(|(name, _)| !is_set(name));
+            variant.set.extend(chosen.set.iter().cloned());
+        }
     }
     Some(sweep)
 }
@@ -332,6 +346,7 @@ fn read_extent(reader: &mut Reader, fields: &Fields<'_>) -> Extent {
         measure: count(reader, fields, "measure", MOST_FRAMES),
         sequence: fields.get("sequence").and_then(|tree| read_sequence(reader, tree)),
         paths: None,
+        set: Vec::new(),
     }
 }
 
@@ -432,18 +447,21 @@ fn read_variants(reader: &mut Reader, tree: &Tree) -> Vec<Variant> {
 fn read_variant(reader: &mut Reader, name: Spanned, tree: &Tree) -> Option<Variant> {
     let fields = reader.record(tree, &VARIANT)?;
     let pipeline = fields.get("pipeline").and_then(|t| reader.text(t, "a pipeline in quotes"));
-    let mut set = Vec::new();
-    if let Some(tree) = fields.get("set") {
-        for (name, tree) in reader.map(tree, "values") {
-            if let Some(value) = read_literal(reader, tree) {
-                set.push((name.text, Preset { value, name_span: name.span, span: reader.span(&tree.range) }));
-            }
-        }
-    }
+    let set = fields.get("set").map(|tree| read_set(reader, tree)).unwrap_or_default();
     let vary = fields.get("vary").map(|tree| read_vary(reader, tree)).unwrap_or_default();
     let frames = count(reader, &fields, "frames", MOST_FRAMES);
     let image = fields.get("image").and_then(|t| reader.text(t, "the name of a resource in quotes"));
     Some(Variant { name, pipeline: pipeline?, set, vary, frames, image })
+}
+
+fn read_set(reader: &mut Reader, tree: &Tree) -> Vec<(String, Preset)> {
+    let mut set = Vec::new();
+    for (name, tree) in reader.map(tree, "values") {
+        if let Some(value) = read_literal(reader, tree) {
+            set.push((name.text, Preset { value, name_span: name.span, span: reader.span(&tree.range) }));
+        }
+    }
+    set
 }
 
 fn read_vary(reader: &mut Reader, tree: &Tree) -> Vec<Zip> {

@@ -139,10 +139,13 @@ mod tests {
 
     #[test]
     fn the_small_size_takes_the_place_of_what_it_names() {
-        let text = r#"Sweep(doc: "?", variants: {"a": (pipeline: "p")}, scenes: ["s", "t"], frames: 9, vary: [{"x": [1, 2, 3]}], small: (scenes: ["u"], paths: 3))"#;
+        let text = r#"Sweep(doc: "?", variants: {"a": (pipeline: "p", set: {"y": 9, "z": 1})}, scenes: ["s", "t"], frames: 9, vary: [{"x": [1, 2, 3]}],
+            small: (scenes: ["u"], paths: 3, set: {"y": 2}))"#;
         let source = Arc::new(Source { name: "test.ron".to_owned(), path: None, text: Arc::from(text) });
         let small = Sweep::read(&source, true).expect("good");
         assert_eq!((small.scenes.len(), small.frames, small.reference.paths), (1, 9, 3));
         assert_eq!((small.runs().len(), read(text).runs().len()), (2, 6));
+        let value = |sweep: &Sweep, name: &str| sweep.runs()[0].set[name].clone();
+        assert_eq!((value(&small, "y"), value(&small, "z"), value(&read(text), "y")), ("2".to_owned(), "1".to_owned(), "9".to_owned()));
     }
 }
