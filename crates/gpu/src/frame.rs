@@ -82,8 +82,8 @@ pub(crate) struct Draw {
     pub(crate) bindings: Bindings,
     pub(crate) vertices: u32,
     pub(crate) instances: u32,
-    /// Views for frames of even and odd index, and whether the target is cleared.
-    pub(crate) targets: Vec<([wgpu::TextureView; 2], bool)>,
+    /// Views for frames of even and odd index, and whether the target is cleared; none where nothing is drawn to.
+    pub(crate) targets: Vec<Option<([wgpu::TextureView; 2], bool)>>,
     pub(crate) depth: Option<([wgpu::TextureView; 2], bool)>,
 }
 

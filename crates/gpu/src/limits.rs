@@ -139,9 +139,9 @@ fn check_step(limits: &wgpu::Limits, plan: &Plan, node: &PlanNode, step: &PlanSt
 }
 
 /// Bytes of a pixel over all colour targets, counted as WebGPU does.
-fn attachment_bytes(plan: &Plan, targets: &[usize]) -> u32 {
+fn attachment_bytes(plan: &Plan, targets: &[Option<usize>]) -> u32 {
     let mut total: u32 = 0;
-    for &target in targets {
+    for &target in targets.iter().flatten() {
         if let Some(ResourceDesc::Texture { format, .. }) = plan.resources.get(target).map(|r| &r.desc) {
             let format = texture_format(*format);
             let align = format.target_component_alignment().unwrap_or(1);

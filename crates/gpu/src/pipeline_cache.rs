@@ -47,7 +47,7 @@ pub(crate) struct RenderKey {
     pub(crate) fragment: String,
     pub(crate) constants: Constants,
     pub(crate) layout: LayoutKey,
-    pub(crate) targets: Vec<wgpu::TextureFormat>,
+    pub(crate) targets: Vec<Option<wgpu::TextureFormat>>,
     pub(crate) depth: bool,
 }
 
@@ -190,7 +190,7 @@ impl PipelineCache {
         }
         let module = self.module(gpu, shader)?;
         let constants = key.constants.slice();
-        let targets: Vec<_> = key.targets.iter().map(|&format| Some(wgpu::ColorTargetState::from(format))).collect();
+        let targets: Vec<_> = key.targets.iter().map(|&format| format.map(wgpu::ColorTargetState::from)).collect();
         let descriptor = wgpu::RenderPipelineDescriptor {
             label: Some(&key.fragment),
             layout: Some(layout),

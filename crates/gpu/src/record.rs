@@ -39,7 +39,8 @@ pub(crate) fn compute(encoder: &mut wgpu::CommandEncoder, label: &str, steps: &[
 /// Records a draw in a pass of its own.
 pub(crate) fn draw(encoder: &mut wgpu::CommandEncoder, label: &str, step: &Draw, parity: usize, stamps: Stamps<'_>) {
     let mut colors = [const { None }; MOST_TARGETS];
-    for (slot, (views, clear)) in colors.iter_mut().zip(&step.targets) {
+    for (slot, target) in colors.iter_mut().zip(&step.targets) {
+        let Some((views, clear)) = target else { continue };
         let load = if *clear { wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { wgpu::LoadOp::Load };
         *slot = Some(wgpu::RenderPassColorAttachment {
             view: &views[parity],

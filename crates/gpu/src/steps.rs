@@ -72,12 +72,12 @@ pub(crate) fn prepare(
     }
 }
 
-fn color_formats(gpu: &Gpu, plan: &Plan, targets: &[ResourceIx]) -> Result<Vec<wgpu::TextureFormat>, String> {
+fn color_formats(gpu: &Gpu, plan: &Plan, targets: &[Option<ResourceIx>]) -> Result<Vec<Option<wgpu::TextureFormat>>, String> {
     if targets.len() > MOST_TARGETS {
         return Err(format!("it has more than {MOST_TARGETS} colour targets"));
     }
-    let format_of = |ix: &ResourceIx| {
-        let resource = &plan.resources[*ix];
+    let format_of = |ix: ResourceIx| {
+        let resource = &plan.resources[ix];
         let name = &resource.name;
         match resource.desc {
             ResourceDesc::Texture { format: Format::Depth32Float, .. } => Err(format!("`{name}` is a depth texture and no colour target")),
@@ -93,7 +93,7 @@ fn color_formats(gpu: &Gpu, plan: &Plan, targets: &[ResourceIx]) -> Result<Vec<w
             _ => Err(format!("`{name}` is a buffer and no colour target")),
         }
     };
-    targets.iter().map(format_of).collect()
+    targets.iter().map(|ix| ix.map(format_of).transpose()).collect()
 }
 
 /// The number of workgroups that lies in a buffer.
@@ -132,7 +132,7 @@ pub(crate) fn pass(
                 cleared.push(ix);
                 Ok::<_, String>(([of(0)?, of(1)?], clear))
             };
-            let targets = targets.iter().map(|ix| attach(*ix));
+            let targets = targets.iter().map(|ix| ix.map(&mut attach).transpose());
             let targets = targets.collect::<Result<_, _>>()?;
             let depth = depth.map(attach).transpose()?;
             Ok(Pass::Draw(Box::new(Draw { pipeline, bindings, vertices: *vertices, instances: *instances, targets, depth })))

@@ -89,7 +89,7 @@ pub(crate) fn usages(plan: &Plan) -> Vec<Usage> {
     for node in &plan.nodes {
         for step in &node.steps {
             if let PlanStep::Draw { targets, depth, .. } = step {
-                for &ix in targets.iter().chain(depth) {
+                for &ix in targets.iter().flatten().chain(depth) {
                     all[ix].target = true;
                 }
             }

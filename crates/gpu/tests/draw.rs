@@ -81,6 +81,46 @@ fn targets_are_cleared_to_zero() {
     assert!(world.image(&frame, "color").data.iter().chain(&world.image(&frame, "depth").data).all(|v| *v == 0.0));
 }
 
+/// A target that nobody reads is left out; the others keep their places.
+#[test]
+fn a_draw_without_one_of_its_targets_writes_the_others() {
+    let node = NODE.replace("\"color\": Texture(format: Rgba8Unorm,", "\"color\": Texture(format: Rgba8Unorm, optional: true,");
+    let pipeline = PIPELINE.replace(
+        "\"id\": Texture(format: R32Uint, size: Output)",
+        "\"id\": Texture(format: R32Uint, size: Output), \"seen\": Texture(format: Rgba8Unorm, size: Output)",
+    );
+    let pipeline =
+        pipeline.replace("nodes: [", "nodes: [(id: \"see\", node: \"test/see\"),").replace("presents: \"color\"", "presents: \"seen\"");
+    let see = r#"Node(doc: "Shows it.", inputs: {"id": Texture(format: R32Uint, doc: "triangle + 1")},
+        outputs: {"seen": Texture(format: Rgba8Unorm, doc: "the same")}, steps: [(entry: "see", over: Texels("seen"))])"#;
+    let see_shader = r"
+@group(0) @binding(0) var id: texture_2d<u32>;
+@group(0) @binding(1) var seen: texture_storage_2d<rgba8unorm, write>;
+@compute @workgroup_size(1) fn see(@builtin(global_invocation_id) at: vec3u) {
+    textureStore(seen, at.xy, vec4f(f32(textureLoad(id, at.xy, 0).x) / 255.0));
+}";
+    let files = [
+        ("shaders/test/draw.ron", node.as_str()),
+        ("shaders/test/draw.wgsl", SHADER),
+        ("shaders/test/see.ron", see),
+        ("shaders/test/see.wgsl", see_shader),
+        ("pipelines/test.ron", pipeline.as_str()),
+    ];
+    let world = World::new(&files).keep(&["id", "depth"]);
+    let frame = world.once();
+    assert_eq!(frame.plan().resource("color"), None);
+    let (id, seen) = (world.image(&frame, "id"), world.image(&frame, "seen"));
+    assert!(
+        (0..id.height)
+            .all(|y| (0..id.width).all(|x| (seen.pixel(x, y)[0] * 255.0).round() == id.pixel(x, y)[0] && id.pixel(x, y)[0] > 0.0))
+    );
+    assert!(world.gpu.take_errors().is_empty());
+    // With somebody who keeps it, all is as before.
+    let world = World::new(&files).keep(&["id", "color"]);
+    let frame = world.once();
+    assert!(world.image(&frame, "color").data.iter().any(|v| *v != 0.0));
+}
+
 const OPTIONAL: &str = r#"Node(doc: "Looks at ports that may be absent.",
     inputs: {
         "map": Texture(optional: true, doc: "floats"), "codes": Texture(format: R32Uint, optional: true, doc: "codes"),

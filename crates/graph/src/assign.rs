@@ -78,6 +78,11 @@ impl<'a> Values<'a> {
             .collect()
     }
 
+    /// Whether a parameter of a node is set from outside.
+    pub fn is_set(&self, node: &str, name: &str) -> bool {
+        self.nodes.contains_key(&format!("{node}.{name}"))
+    }
+
     fn from(&self, source: &ParamSource<'_>, kind: &ParamKind, holds: &dyn Fn(&Condition) -> bool) -> Value {
         match source {
             ParamSource::Fixed(value) => value.clone(),

@@ -15,6 +15,8 @@ use crate::{
     tree::{Kind, Tree, keys},
 };
 
+pub(crate) mod when;
+
 /// A declaration without its shader.
 pub(crate) struct Declaration {
     pub doc: String,
@@ -64,6 +66,7 @@ fn read_node(reader: &mut Reader, tree: &Tree, host: bool) -> Option<Declaration
     }
     declared.extend(fields.get("params").map(keys).unwrap_or_default());
     let params = fields.get("params").map(|t| read_params(reader, t)).unwrap_or_default();
+    when::check(reader, &ports, &params, &fields.get("params").map(keys).unwrap_or_default());
     let mut requires = Vec::new();
     if let Some(tree) = fields.get("requires") {
         for item in reader.list(tree, "device features") {
@@ -141,9 +144,11 @@ fn read_port(reader: &mut Reader, tree: &Tree, direction: Direction, span: Span)
         }
     };
     let shape = match kind_name.as_str() {
-        "Texture" => Shape { what: "Texture", required: &["doc"], optional: &["format", "array", "optional", "at_least", "at_most"] },
-        "Buffer" => Shape { what: "Buffer", required: &["of", "doc"], optional: &["optional", "at_least", "at_most"] },
-        "Uniform" => Shape { what: "Uniform", required: &["of", "doc"], optional: &["optional"] },
+        "Texture" => {
+            Shape { what: "Texture", required: &["doc"], optional: &["format", "array", "optional", "when", "at_least", "at_most"] }
+        }
+        "Buffer" => Shape { what: "Buffer", required: &["of", "doc"], optional: &["optional", "when", "at_least", "at_most"] },
+        "Uniform" => Shape { what: "Uniform", required: &["of", "doc"], optional: &["optional", "when"] },
         other => {
             reader.error(&head(tree), format!("unknown kind of port `{other}`"), suggest(other, PORT_KINDS.iter().copied()));
             return None;
@@ -152,6 +157,10 @@ fn read_port(reader: &mut Reader, tree: &Tree, direction: Direction, span: Span)
     let fields = reader.record(tree, &shape)?;
     let doc = fields.get("doc").and_then(|t| reader.text(t, "a sentence in quotes")).map(|d| d.text).unwrap_or_default();
     let optional = fields.get("optional").and_then(|t| reader.boolean(t)).unwrap_or(false);
+    let when = match fields.get("when") {
+        Some(tree) => Some(when::read(reader, tree, direction)?),
+        None => None,
+    };
     let kind = match kind_name.as_str() {
         "Texture" => {
             let format = match fields.get("format") {
@@ -170,7 +179,7 @@ fn read_port(reader: &mut Reader, tree: &Tree, direction: Direction, span: Span)
         }
         reader.float(tree, "a number")
     });
-    Some(Port { direction, kind, optional, at_least, at_most, doc, span })
+    Some(Port { direction, kind, optional, when, at_least, at_most, doc, span })
 }
 
 /// A WGSL type by name; long spellings of vectors become short ones.
@@ -252,7 +261,7 @@ fn target(reader: &mut Reader, tree: &Tree, names: &Names<'_>, depth: bool) -> O
     let name = reader.text(tree, "the name of an output port in quotes")?;
     let port = find_port(reader, &name, names)?;
     let is_depth = match port.kind {
-        PortKind::Texture { format: Some(format), array: false } if port.direction == Direction::Output && !port.optional => {
+        PortKind::Texture { format: Some(format), array: false } if port.direction == Direction::Output && (!depth || !port.optional) => {
             format == crate::value::Format::Depth32Float
         }
         _ => {
@@ -260,7 +269,7 @@ fn target(reader: &mut Reader, tree: &Tree, names: &Names<'_>, depth: bool) -> O
             reader.out.push(
                 Diagnostic::error(format!("`{}` cannot be drawn to", name.text), name.span)
                     .and(span, "declared here")
-                    .help("targets are output textures with a `format`, neither optional nor arrays"),
+                    .help("targets are output textures with a `format` and no arrays; that of depth is not optional"),
             );
             return None;
         }
@@ -326,6 +335,11 @@ fn read_expr(reader: &mut Reader, tree: &Tree, names: &Names<'_>) -> Option<Expr
         good &= match r.kind {
             RefKind::Texture => port_of_kind(reader, &r.name, names, true).is_some(),
             RefKind::Buffer => port_of_kind(reader, &r.name, names, false).is_some(),
+            RefKind::Condition => {
+                let fault = Diagnostic::error("a node has no conditions with names", r.name.span.clone());
+                reader.out.push(fault.help("`Holds` belongs into the sizes of a pipeline's resources"));
+                false
+            }
             RefKind::Param => match names.params.get(&r.name.text) {
                 Some(Param { kind: crate::value::ParamKind::Int { .. }, .. }) => true,
                 Some(param) => {

@@ -133,7 +133,7 @@ impl Plan {
                 }
                 PlanStep::Draw { vertex, fragment, vertices, instances, targets, depth } => json!({
                     "vertex": vertex, "fragment": fragment, "vertices": vertices, "instances": instances,
-                    "targets": targets.iter().map(|ix| name(*ix)).collect::<Vec<_>>(), "depth": depth.map(name),
+                    "targets": targets.iter().map(|ix| ix.map(name)).collect::<Vec<_>>(), "depth": depth.map(name),
                 }),
             });
             json!({

@@ -39,6 +39,8 @@ pub enum RefKind {
     Texture,
     /// A buffer (`Elements`).
     Buffer,
+    /// A condition with a name (`Holds`).
+    Condition,
 }
 
 /// Where an expression gets its numbers from.
@@ -47,6 +49,8 @@ pub(crate) trait Scope {
     fn output(&self) -> (u32, u32);
     fn texture(&self, name: &str) -> Option<(u32, u32)>;
     fn elements(&self, name: &str) -> Option<u64>;
+    /// Whether the condition of a name holds, where there are any.
+    fn holds(&self, name: &str) -> Option<bool>;
 }
 
 /// Why an expression has no value.
@@ -78,6 +82,7 @@ pub(crate) fn eval(expr: &Expr, scope: &dyn Scope) -> Result<u64, EvalError> {
         Expr::Width(name) => scope.texture(name).map(|size| size.0.into()).ok_or_else(|| EvalError::Unknown(name.clone())),
         Expr::Height(name) => scope.texture(name).map(|size| size.1.into()).ok_or_else(|| EvalError::Unknown(name.clone())),
         Expr::Elements(name) => scope.elements(name).ok_or_else(|| EvalError::Unknown(name.clone())),
+        Expr::Holds(name) => scope.holds(name).map(u64::from).ok_or_else(|| EvalError::Unknown(name.clone())),
         Expr::Mul(list) => all(list, 1, &|a, b| a.checked_mul(b)),
         Expr::Add(list) => all(list, 0, &|a, b| a.checked_add(b)),
         Expr::Min(list) => all(list, u64::MAX, &|a, b| Some(a.min(b))),
@@ -96,6 +101,7 @@ const FORMS: &[&str] = &[
     "Width",
     "Height",
     "Elements",
+    "Holds",
     "Mul",
     "Add",
     "Min",
@@ -129,7 +135,7 @@ fn read_into(reader: &mut Reader, tree: &Tree, refs: &mut Vec<ExprRef>) -> Optio
         Kind::Tuple(Some(name), items) => {
             let text = name.text.as_str();
             match text {
-                "Param" | "Width" | "Height" | "Elements" => {
+                "Param" | "Width" | "Height" | "Elements" | "Holds" => {
                     let [item] = items.as_slice() else {
                         reader.error(&tree.range, format!("`{text}` takes one name"), format!("write `{text}(\"name\")`"));
                         return None;
@@ -139,6 +145,7 @@ fn read_into(reader: &mut Reader, tree: &Tree, refs: &mut Vec<ExprRef>) -> Optio
                         "Param" => (RefKind::Param, Expr::Param),
                         "Width" => (RefKind::Texture, Expr::Width),
                         "Height" => (RefKind::Texture, Expr::Height),
+                        "Holds" => (RefKind::Condition, Expr::Holds),
                         _ => (RefKind::Buffer, Expr::Elements),
                     };
                     let expr = expr(name.text.clone());

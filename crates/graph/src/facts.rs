@@ -77,6 +77,11 @@ impl<'f> Facts<'f> {
         self.verdict(condition).holds
     }
 
+    /// What the conditions with names came to.
+    pub fn named(&self) -> BTreeMap<&'f str, bool> {
+        self.named.iter().map(|(name, verdict)| (*name, verdict.holds)).collect()
+    }
+
     pub fn verdict(&self, condition: &Condition) -> Verdict {
         match &condition.kind {
             ConditionKind::All(list) => {

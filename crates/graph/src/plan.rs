@@ -138,11 +138,22 @@ pub enum PlanStep {
         vertices: u32,
         /// How often all of them are drawn.
         instances: u32,
-        /// Colour attachments: resources in the order of `@location`.
-        targets: Vec<ResourceIx>,
+        /// Colour attachments: resources in the order of `@location`; none where an optional output is not made.
+        targets: Vec<Option<ResourceIx>>,
         /// Depth attachment.
         depth: Option<ResourceIx>,
     },
+}
+
+/// A value that a condition chose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chosen {
+    /// The node's parameter.
+    pub param: String,
+    /// Its value.
+    pub value: Value,
+    /// What the condition came to: the clauses that decided, with the values they met.
+    pub because: String,
 }
 
 /// A node that will run.
@@ -162,6 +173,8 @@ pub struct PlanNode {
     pub steps: Vec<PlanStep>,
     /// Why its condition holds: the clauses that decided, with the values they met. `None` if it has no condition.
     pub because: Option<String>,
+    /// Parameters whose values a condition chose, in the order of the usage.
+    pub chosen: Vec<Chosen>,
     /// Frames after which it stops, when nothing but the frame's number and its own history changed; its outputs stay.
     pub settles: Option<u32>,
 }

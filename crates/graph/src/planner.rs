@@ -4,18 +4,20 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{
     assign::Values,
+    declaration::when,
     diagnostics::{Diagnostic, Diagnostics, Severity, Span},
     expr::Scope,
     facts::{Facts, Seen, Verdict},
     order::{self, Dag},
     pipeline::Pipeline,
-    plan::{Idle, IdleNode, Lifetime, Plan, PlanInput, PlanNode, PlanResource, PlanStep, Target, Usage},
+    plan::{Chosen, Idle, IdleNode, Lifetime, Plan, PlanInput, PlanNode, PlanResource, PlanStep, Target, Usage},
     refuse,
-    registry::{Direction, Registry, Step},
-    resolve::{Linked, Wire, link},
+    registry::{Direction, Port, Registry, Step},
+    resolve::{Linked, LinkedNode, ParamSource, Wire, link},
     sizes::{LARGEST_SIDE, Sizes},
     slots,
     steps::{self, NodeScope},
+    value::Value,
 };
 
 /// Plans a frame.
@@ -77,6 +79,10 @@ pub(crate) struct Planner<'a, 'p> {
     pub input: &'p PlanInput,
     facts: Facts<'p>,
     pub out: &'p mut Vec<Diagnostic>,
+    /// Parameters of each node.
+    params: Vec<Vec<(String, Value)>>,
+    /// Of each node the ports that its parameters leave unused.
+    unused: Vec<BTreeSet<&'a str>>,
 }
 
 /// What conditions leave: who is on and who writes what.
@@ -100,7 +106,20 @@ impl Activity<'_> {
 
 impl<'a, 'p> Planner<'a, 'p> {
     pub fn new(linked: &'p Linked<'a>, values: &'p Values<'a>, input: &'p PlanInput, out: &'p mut Vec<Diagnostic>) -> Self {
-        Self { linked, values, input, facts: Facts::new(linked, values, Seen::from(input)), out }
+        let facts = Facts::new(linked, values, Seen::from(input));
+        let params: Vec<_> = linked.nodes.iter().map(|node| values.of_node(node, &|condition| facts.holds(condition))).collect();
+        let unused = |(node, params): (&LinkedNode<'a>, &Vec<(String, Value)>)| {
+            let holds = |port: &Port| port.when.as_ref().is_none_or(|when| when::holds(when, params));
+            node.ports().filter(|(_, port, _)| !holds(port)).map(|(name, ..)| name).collect()
+        };
+        let unused = linked.nodes.iter().zip(&params).map(unused).collect();
+        Self { linked, values, input, facts, out, params, unused }
+    }
+
+    /// Ports of a node with what they are wired to; nothing where the port is not used.
+    fn ports(&self, node: usize) -> Vec<(&'a str, &'a Port, Wire<'a>)> {
+        let wire = |name: &str, wire| if self.unused[node].contains(name) { Wire::Absent } else { wire };
+        self.linked.nodes[node].ports().map(|(name, port, own)| (name, port, wire(name, own))).collect()
     }
 
     /// The plan, if it can be made; what is in the way goes to `out`.
@@ -111,7 +130,7 @@ impl<'a, 'p> Planner<'a, 'p> {
         let cyclic = self.cycles(&dag);
         let live = self.live(&activity);
         let runs = if self.input.debug.no_culling { self.runnable(&activity, &live) } else { live };
-        let mut sizes = Sizes::new(self.linked, self.values, self.input);
+        let mut sizes = Sizes::new(self.linked, self.values, self.input, self.facts.named());
         let plan = self.assemble(&activity, &dag, &runs, &mut sizes);
         let faults = self.out.iter().filter(|d| d.severity == Severity::Error).count();
         if cyclic || faults > before { None } else { plan }
@@ -129,9 +148,11 @@ impl<'a, 'p> Planner<'a, 'p> {
         let mut table = Table::default();
         // In the order of the documents, so that plans of one pipeline look alike.
         let mut used: BTreeSet<&str> = BTreeSet::new();
+        let wanted = self.wanted(runs);
         for index in &order {
-            for (_, _, wire) in self.linked.nodes[*index].ports() {
+            for (_, port, wire) in self.ports(*index) {
                 match wire {
+                    Wire::Resource { name, .. } if is_left_out(port, name, &wanted) => false,
                     Wire::Resource { name, .. } if activity.producer.get(name).is_some_and(|p| runs.contains(p)) => used.insert(name),
                     Wire::External(name) => used.insert(name),
                     _ => false,
@@ -147,7 +168,7 @@ impl<'a, 'p> Planner<'a, 'p> {
         }
         let mut nodes = Vec::with_capacity(order.len());
         for (position, index) in order.iter().enumerate() {
-            nodes.extend(self.node(*index, position, activity, &mut table));
+            nodes.extend(self.node(*index, position, activity, &mut table, &wanted));
         }
         let presents = table.index.get(self.linked.pipeline.presents.text.as_str()).copied();
         let radiance = self.linked.pipeline.radiance.as_ref().and_then(|r| table.index.get(r.text.as_str()).copied());
@@ -165,15 +186,31 @@ impl<'a, 'p> Planner<'a, 'p> {
         })
     }
 
-    fn node(&mut self, index: usize, position: usize, activity: &Activity<'a>, table: &mut Table<'a>) -> Option<PlanNode> {
+    /// Resources that somebody reads.
+    fn wanted(&self, runs: &BTreeSet<usize>) -> BTreeSet<&'a str> {
+        let pipeline = self.linked.pipeline;
+        let shown = [Some(&pipeline.presents), pipeline.radiance.as_ref()].into_iter().flatten().map(|name| name.text.as_str());
+        let kept = pipeline.resources.keys().map(String::as_str).filter(|name| self.input.keep.iter().any(|kept| kept == name));
+        shown.chain(kept).chain(runs.iter().flat_map(|node| self.reads(*node)).map(|(name, ..)| name)).collect()
+    }
+
+    fn node(
+        &mut self,
+        index: usize,
+        position: usize,
+        activity: &Activity<'a>,
+        table: &mut Table<'a>,
+        wanted: &BTreeSet<&str>,
+    ) -> Option<PlanNode> {
         let linked = &self.linked.nodes[index];
         let mut bindings = Vec::with_capacity(linked.wires.len());
         let mut ports = BTreeMap::new();
-        for (port_name, port, wire) in linked.ports() {
+        for (port_name, port, wire) in self.ports(index) {
             let drawn = linked.decl.is_some_and(|d| {
                 d.steps.iter().any(|s| matches!(s, Step::Draw { targets, depth, .. } if targets.iter().any(|t| t == port_name) || depth.as_deref() == Some(port_name)))
             });
             let target = match wire {
+                Wire::Resource { name, .. } if is_left_out(port, name, wanted) => Target::Absent,
                 Wire::Resource { name, previous, .. } => match table.index.get(name).copied() {
                     Some(ix) if previous => {
                         table.previous[ix] = true;
@@ -186,6 +223,14 @@ impl<'a, 'p> Planner<'a, 'p> {
                     None => Target::Absent,
                 },
                 Wire::External(name) => table.index.get(name).map_or(Target::Absent, |ix| Target::Resource(*ix)),
+                Wire::Missing => {
+                    let id = &linked.usage.id;
+                    let fault = Diagnostic::error(format!("the input `{port_name}` of `{}` is not connected", id.text), id.span.clone());
+                    let fault = fault.and(port.span.clone(), "the port, which is used with these parameters");
+                    self.out
+                        .push(fault.help(format!("add `\"{port_name}\": \"resource\"` to `in`, or set the node's parameters otherwise")));
+                    Target::Absent
+                }
                 Wire::Absent | Wire::Faulty => Target::Absent,
             };
             if let Target::Resource(ix) | Target::Previous(ix) = target {
@@ -203,7 +248,7 @@ impl<'a, 'p> Planner<'a, 'p> {
             }
             bindings.push((port_name.to_owned(), target));
         }
-        let params = self.values.of_node(linked, &|condition| self.facts.holds(condition));
+        let params = self.params[index].clone();
         let id = linked.usage.id.text.clone();
         // Nodes without a declaration write nothing that is known, so none is live.
         let decl = std::sync::Arc::clone(linked.decl?);
@@ -213,7 +258,14 @@ impl<'a, 'p> Planner<'a, 'p> {
         let frames = decl.settles.as_ref().and_then(|name| scope.param(name)).filter(|frames| *frames > 0);
         let settles = frames.and_then(|frames| u32::try_from(frames).ok());
         let because = activity.verdicts[index].as_ref().map(Verdict::why);
-        Some(PlanNode { id, stage: linked.usage.stage.clone(), decl, bindings, params, steps, because, settles })
+        let chosen = linked.params.iter().zip(&params).filter_map(|((name, source), (_, value))| match source {
+            ParamSource::If(when, ..) if !self.values.is_set(&id, name) => {
+                Some(Chosen { param: (*name).to_owned(), value: value.clone(), because: self.facts.verdict(when).why() })
+            }
+            _ => None,
+        });
+        let chosen = chosen.collect();
+        Some(PlanNode { id, stage: linked.usage.stage.clone(), decl, bindings, params, steps, because, chosen, settles })
     }
 
     fn idle(&self, activity: &Activity<'a>, runs: &BTreeSet<usize>) -> Vec<IdleNode> {
@@ -227,6 +279,11 @@ impl<'a, 'p> Planner<'a, 'p> {
             })
             .collect()
     }
+}
+
+/// Whether an output is not made, as nobody reads it.
+fn is_left_out(port: &Port, resource: &str, wanted: &BTreeSet<&str>) -> bool {
+    port.direction == Direction::Output && port.optional && !wanted.contains(resource)
 }
 
 /// Resources of the plan while it is made.

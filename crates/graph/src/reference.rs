@@ -59,7 +59,8 @@ pub fn node_text(node: &NodeDecl) -> String {
         let _ = writeln!(out, "\n{title}:");
         for (name, port) in ports {
             let optional = if port.optional { ", optional" } else { "" };
-            let _ = writeln!(out, "  {name:width$}  {}{optional}. {}", what(port), port.doc);
+            let when = port.when.as_ref().map(|when| format!(", used when {}", when.span.text())).unwrap_or_default();
+            let _ = writeln!(out, "  {name:width$}  {}{optional}{when}. {}", what(port), port.doc);
         }
     }
     if !node.params.is_empty() {
@@ -120,7 +121,8 @@ pub fn node_markdown(node: &NodeDecl) -> String {
                 (Direction::Output, false) => "out",
                 (Direction::Output, true) => "out, optional",
             };
-            let _ = writeln!(out, "| `{name}` ({way}) | {} | {} |", cell(&what(port)), cell(&port.doc));
+            let when = port.when.as_ref().map(|when| format!("; used when `{}`", when.span.text())).unwrap_or_default();
+            let _ = writeln!(out, "| `{name}` ({way}) | {} | {} |", cell(&(what(port) + &when)), cell(&port.doc));
         }
     }
     if !node.params.is_empty() {
@@ -154,7 +156,7 @@ pub fn json(registry: &Registry) -> Json {
 pub fn node_json(node: &NodeDecl) -> Json {
     let ports = |direction: Direction| -> Json {
         let ports = node.ports.iter().filter(|(_, p)| p.direction == direction);
-        Json::Object(ports.map(|(name, p)| (name.clone(), json!({ "is": what(p), "optional": p.optional, "doc": p.doc }))).collect())
+        Json::Object(ports.map(|(name, p)| (name.clone(), json!({ "is": what(p), "optional": p.optional, "when": p.when.as_ref().map(|when| when.span.text()), "doc": p.doc }))).collect())
     };
     let params = node.params.iter().map(|(name, param)| {
         let mut object = json!({ "type": param.kind.type_name(), "default": value(&param.kind.default_value()), "doc": param.doc });

@@ -106,7 +106,8 @@ impl<'a> Refusals<'_, 'a> {
             ParamKind::Bool { .. } => vec![Value::Bool(false), Value::Bool(true)],
             ParamKind::Choice { options, .. } => options.iter().cloned().map(Value::Choice).collect(),
             ParamKind::Int { min, max, .. } => {
-                let sides = bounds.iter().chain(&estimates).flat_map(|bound| [(bound.ceil() as i64).saturating_sub(1), bound.ceil() as i64]);
+                let sides =
+                    bounds.iter().chain(&estimates).flat_map(|bound| [(bound.ceil() as i64).saturating_sub(1), bound.ceil() as i64]);
                 sides.filter(|value| (*min..=*max).contains(value)).map(Value::Int).collect()
             }
             // Just below a bound is no number that anyone would write.

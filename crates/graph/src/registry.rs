@@ -8,6 +8,7 @@ use std::{
 use indexmap::IndexMap;
 
 use crate::{
+    condition::Condition,
     diagnostics::Span,
     shader::{Layout, Shader},
     value::{Format, ParamKind},
@@ -50,8 +51,11 @@ pub struct Port {
     pub direction: Direction,
     /// What fits.
     pub kind: PortKind,
-    /// May be left unconnected or connected to a resource whose producer is off; an empty placeholder is bound then.
+    /// An input may be left unconnected or connected to a resource whose producer is off; an output that nobody reads is not made.
+    /// An empty placeholder is bound then, or the draw target left out.
     pub optional: bool,
+    /// Values of the node's own parameters with which it is used; always, if absent. Otherwise it is as if it were left unconnected.
+    pub when: Option<Condition>,
     /// Of an output: no number written is less. Told by `Debug::watch_numbers` where it does not hold.
     pub at_least: Option<f64>,
     /// Of an output: no number written is greater.
@@ -85,6 +89,8 @@ pub enum Expr {
     Width(String),
     Height(String),
     Elements(String),
+    /// 1 if the condition of this name holds, 0 if not; in a pipeline only.
+    Holds(String),
     Mul(Vec<Expr>),
     Add(Vec<Expr>),
     /// Quotient rounded up; division by zero is an error of the check.

@@ -50,6 +50,8 @@ pub(crate) struct LinkedNode<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Wire<'a> {
     Absent,
+    /// Nothing, which is a fault while the port is used.
+    Missing,
     /// Its fault is reported.
     Faulty,
     External(&'a str),
@@ -285,6 +287,9 @@ impl<'a> Linker<'a, '_> {
     fn unconnected(&mut self, usage: &'a NodeUse, name: &str, port: &'a Port) -> Wire<'a> {
         if port.optional {
             return Wire::Absent;
+        }
+        if port.when.is_some() {
+            return Wire::Missing;
         }
         if self.pipeline.gaps.files || self.pipeline.gaps.resources.contains(name) {
             return Wire::Faulty;

@@ -26,6 +26,8 @@ pub(crate) struct Sizes<'a, 'p> {
     linked: &'p Linked<'a>,
     values: &'p Values<'a>,
     input: &'p PlanInput,
+    /// Whether conditions with names hold.
+    conditions: BTreeMap<&'p str, bool>,
     /// `None` for a resource without a size, whose fault is reported.
     known: BTreeMap<&'a str, Option<ResourceDesc>>,
     /// Resources whose sizes are being computed.
@@ -33,8 +35,8 @@ pub(crate) struct Sizes<'a, 'p> {
 }
 
 impl<'a, 'p> Sizes<'a, 'p> {
-    pub fn new(linked: &'p Linked<'a>, values: &'p Values<'a>, input: &'p PlanInput) -> Self {
-        Self { linked, values, input, known: BTreeMap::new(), depth: 0 }
+    pub fn new(linked: &'p Linked<'a>, values: &'p Values<'a>, input: &'p PlanInput, conditions: BTreeMap<&'p str, bool>) -> Self {
+        Self { linked, values, input, conditions, known: BTreeMap::new(), depth: 0 }
     }
 
     /// The description of a resource or external.
@@ -216,10 +218,10 @@ impl<'a, 'p> Sizes<'a, 'p> {
                 ResourceKind::Buffer { count, .. } => vec![count],
             };
             for r in exprs.iter().flat_map(|e| &e.refs) {
-                if r.kind == RefKind::Param {
-                    params.insert(r.name.text.as_str());
-                } else {
-                    names.push(&r.name.text);
+                match r.kind {
+                    RefKind::Param => _ = params.insert(r.name.text.as_str()),
+                    RefKind::Texture | RefKind::Buffer => names.push(&r.name.text),
+                    RefKind::Condition => {}
                 }
             }
             at.extend(names.into_iter().filter(|n| seen.insert(*n)));
@@ -229,11 +231,11 @@ impl<'a, 'p> Sizes<'a, 'p> {
 
     fn eval(&mut self, name: &str, what: &str, at: &'a ExprAt, out: &mut Vec<Diagnostic>) -> Option<u64> {
         let mut found = BTreeMap::new();
-        for r in at.refs.iter().filter(|r| r.kind != RefKind::Param) {
+        for r in at.refs.iter().filter(|r| matches!(r.kind, RefKind::Texture | RefKind::Buffer)) {
             let desc = self.get(&r.name.text, out)?;
             found.insert(r.name.text.as_str(), desc);
         }
-        let scope = ResourceScope { values: self.values, output: self.input.output, found };
+        let scope = ResourceScope { values: self.values, conditions: &self.conditions, output: self.input.output, found };
         match expr::eval(&at.expr, &scope) {
             Ok(value) => Some(value),
             Err(EvalError::Unknown(_)) => None,
@@ -272,6 +274,7 @@ impl<'a, 'p> Sizes<'a, 'p> {
 
 struct ResourceScope<'s, 'a> {
     values: &'s Values<'a>,
+    conditions: &'s BTreeMap<&'s str, bool>,
     output: (u32, u32),
     found: BTreeMap<&'s str, ResourceDesc>,
 }
@@ -300,6 +303,10 @@ impl Scope for ResourceScope<'_, '_> {
             ResourceDesc::Buffer { count, .. } => Some(*count),
             _ => None,
         }
+    }
+
+    fn holds(&self, name: &str) -> Option<bool> {
+        self.conditions.get(name).copied()
     }
 }
 

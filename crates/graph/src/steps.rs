@@ -54,6 +54,11 @@ impl Scope for NodeScope<'_> {
             None => Some(0),
         }
     }
+
+    /// A node knows no conditions of pipelines: its declaration cannot name one.
+    fn holds(&self, _: &str) -> Option<bool> {
+        None
+    }
 }
 
 /// All steps of the node `id`. Steps without any work are left out. Faults go to `out`.
@@ -146,7 +151,8 @@ fn unroll_step(step: &Step, scope: &NodeScope<'_>, steps: &mut Vec<PlanStep>) ->
                 |expr| expr::eval(expr, scope).map_err(StepError::from).and_then(|n| u32::try_from(n).map_err(|_| StepError::Draws(n)));
             let (vertices, instances) = (count(vertices)?, count(instances)?);
             let sized = |port: &String| scope.texture(port).map(|size| (port.clone(), size));
-            let mut all = targets.iter().chain(depth).filter_map(sized);
+            let is_there = |port: &&String| scope.ports.contains_key(port.as_str());
+            let mut all = targets.iter().chain(depth).filter(is_there).filter_map(sized);
             if let Some(first) = all.next()
                 && let Some(other) = all.find(|(_, size)| *size != first.1)
             {
@@ -156,7 +162,7 @@ fn unroll_step(step: &Step, scope: &NodeScope<'_>, steps: &mut Vec<PlanStep>) ->
                 Some((Target::Resource(ix), _)) => Some(*ix),
                 _ => None,
             };
-            let targets = targets.iter().filter_map(resource).collect();
+            let targets = targets.iter().map(resource).collect();
             let depth = depth.as_ref().and_then(resource);
             steps.push(PlanStep::Draw { vertex: vertex.clone(), fragment: fragment.clone(), vertices, instances, targets, depth });
             Ok(())

@@ -17,6 +17,7 @@ pub(crate) fn find(linked: &Linked<'_>) -> Vec<Diagnostic> {
     }
     let mut resources: BTreeSet<&str> = BTreeSet::new();
     let mut params: BTreeSet<&str> = BTreeSet::new();
+    let mut conditions: BTreeSet<&str> = BTreeSet::new();
     for resource in linked.pipeline.resources.values() {
         let mut exprs = Vec::new();
         match &resource.kind {
@@ -35,10 +36,10 @@ pub(crate) fn find(linked: &Linked<'_>) -> Vec<Diagnostic> {
             ResourceKind::Buffer { count, .. } => exprs.push(count),
         }
         for r in exprs.iter().flat_map(|e| &e.refs) {
-            if r.kind == RefKind::Param {
-                params.insert(&r.name.text)
-            } else {
-                resources.insert(&r.name.text)
+            match r.kind {
+                RefKind::Param => params.insert(&r.name.text),
+                RefKind::Condition => conditions.insert(&r.name.text),
+                RefKind::Texture | RefKind::Buffer => resources.insert(&r.name.text),
             };
         }
     }
@@ -52,7 +53,6 @@ pub(crate) fn find(linked: &Linked<'_>) -> Vec<Diagnostic> {
             taken(source, &mut params);
         }
     }
-    let mut conditions: BTreeSet<&str> = BTreeSet::new();
     let named = linked.pipeline.conditions.values().map(|condition| &condition.when);
     let refusals = linked.pipeline.refuse.iter().map(|refusal| &refusal.when);
     let nodes = linked.pipeline.nodes.values().flat_map(|node| {

@@ -144,6 +144,7 @@ impl Binder<'_> {
             }
         }
         used.extend(self.decl.settles.as_deref());
+        used.extend(crate::declaration::when::tested(&self.decl.ports).map(|name| name.text.as_str()));
         let mut in_steps = BTreeSet::new();
         self.decl.steps.iter().for_each(|s| step_params(s, &mut in_steps));
         for (name, param) in &self.decl.params {

@@ -53,8 +53,9 @@ impl<'a> Planner<'a, '_> {
 
     /// Resources that a node reads, with the last frame's told apart.
     pub(super) fn reads(&self, node: usize) -> impl Iterator<Item = (&'a str, bool, bool, &'a Span)> + use<'a> {
-        let reads: Vec<_> = self.linked.nodes[node]
-            .ports()
+        let reads: Vec<_> = self
+            .ports(node)
+            .into_iter()
             .filter_map(|(_, port, wire)| match (port.direction, wire) {
                 (Direction::Input, Wire::Resource { name, previous, span }) => Some((name, previous, port.optional, span)),
                 _ => None,

@@ -152,7 +152,7 @@ impl<'a> Linker<'a, '_> {
         self.push(Diagnostic::error(format!("there is no measured feature `{}`", name.text), name.span.clone()).help(help));
     }
 
-    fn condition_name(&mut self, name: &Spanned) {
+    pub(super) fn condition_name(&mut self, name: &Spanned) {
         let (known, gaps) = (&self.pipeline.conditions, &self.pipeline.gaps);
         if known.contains_key(&name.text) {
             self.undecided |= self.decided.get(name.text.as_str()) == Some(&false);

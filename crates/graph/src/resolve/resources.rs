@@ -54,10 +54,14 @@ impl<'a> Linker<'a, '_> {
                 needed.push(other);
             }
             for r in exprs.iter().flat_map(|e| &e.refs) {
-                if r.kind == RefKind::Param {
-                    self.int_param(&r.name);
-                } else if self.size_ref(&r.name, r.kind) {
-                    needed.push(&r.name);
+                match r.kind {
+                    RefKind::Param => self.int_param(&r.name),
+                    RefKind::Condition => self.condition_name(&r.name),
+                    RefKind::Texture | RefKind::Buffer => {
+                        if self.size_ref(&r.name, r.kind) {
+                            needed.push(&r.name);
+                        }
+                    }
                 }
             }
             needs.insert(name, needed);

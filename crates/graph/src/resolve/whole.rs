@@ -40,7 +40,7 @@ impl<'a> Linker<'a, '_> {
         for node in nodes {
             for (port_name, port, wire) in node.ports() {
                 let (Direction::Input, Wire::Resource { name, span, .. }) = (port.direction, wire) else { continue };
-                if written.contains(name) || port.optional || self.tainted.contains(name) || !said.insert(name) {
+                if written.contains(name) || port.optional || port.when.is_some() || self.tainted.contains(name) || !said.insert(name) {
                     continue;
                 }
                 let mut fault = Diagnostic::error(format!("`{name}` is read before it is written: no node writes it"), span.clone())

@@ -103,9 +103,9 @@ fn draws_have_targets_of_known_format_and_no_attributes() {
     one(ron, "targets: [\"albedo\"], depth: \"depth\"", "targets: []", &["the step draws to nothing", "11:13"]);
     one(
         ron,
-        "\"albedo\": Texture(format: Rgba16Float,",
-        "\"albedo\": Texture(format: Rgba16Float, optional: true,",
-        &["`albedo` cannot be drawn to", "11:101"],
+        "\"depth\": Texture(format: Depth32Float,",
+        "\"depth\": Texture(format: Depth32Float, optional: true,",
+        &["`depth` cannot be drawn to", "11:119"],
     );
     one(
         ron,
@@ -125,6 +125,23 @@ fn draws_have_targets_of_known_format_and_no_attributes() {
         "requires: [\"FLOAT32_FILTERABL\"], steps: [",
         &["there is no device feature `FLOAT32_FILTERABL`", "14:16", "`FLOAT32_FILTERABLE`"],
     );
+}
+
+#[test]
+fn conditions_of_ports_test_the_node_s_own_parameters() {
+    let when = |condition: &str| format!("\"view\": Uniform(of: \"View\", when: {condition}, doc: \"the camera\")");
+    let view = "\"view\": Uniform(of: \"View\", doc: \"the camera\")";
+    let fault = |condition: &str, parts: &[&str]| one(RON, view, &when(condition), parts);
+    assert_eq!(registry_faults(&with(RON, view, &when("All([Is(\"mode\", \"sum\"), Below(\"strength\", 1.5)])"))), "");
+    fault("Is(\"mod\", \"sum\")", &["this node has no parameter `mod`", "paint.ron:4:46", "did you mean `mode`?"]);
+    fault("Is(\"mode\", \"some\")", &["`mode` has no option `some`", "paint.ron:4:54", "did you mean `sum`?"]);
+    fault("Not(IsOn(\"mode\"))", &["`mode` is Choice", "paint.ron:4:52", "write Is(\"parameter\", \"option\")"]);
+    fault("Is(\"strength\", \"1\")", &["`strength` is Float", "paint.ron:4:46", "AtLeast(\"parameter\", n)"]);
+    fault("Feature(\"glossy\")", &["a port depends on the node's own parameters only", "paint.ron:4:43", "in a pipeline"]);
+    fault("Iss(\"mode\", \"sum\")", &["unknown condition `Iss`", "paint.ron:4:43"]);
+    let output = "\"cells\": Buffer(of: \"Cell\", doc: \"cells\")";
+    let with_condition = "\"cells\": Buffer(of: \"Cell\", when: Is(\"mode\", \"sum\"), doc: \"cells\")";
+    one(RON, output, with_condition, &["an output has no condition of its own", "paint.ron:8:43", "write `optional: true`"]);
 }
 
 #[test]

@@ -70,7 +70,7 @@ fn draws_have_targets_and_vertices() {
         fragment: "fs".into(),
         vertices: 36,
         instances: 1,
-        targets: vec![albedo],
+        targets: vec![Some(albedo)],
         depth: plan.resource("depth"),
     };
     assert_eq!(plan.nodes[0].steps, [step]);
@@ -149,6 +149,60 @@ fn an_optional_input_whose_producer_is_off_is_absent() {
     let plan = try_plan(&files, &input()).unwrap();
     assert_eq!(plan.nodes.iter().find(|n| n.id == "soft").unwrap().bindings[1], ("mask".into(), Target::Absent));
     assert_eq!(plan.idle[1].reason, Idle::Off("`count` is 100, below 200".into()));
+}
+
+/// The mask is for one mode of the blur: otherwise nothing is bound, and who made it need not run.
+#[test]
+fn a_port_that_the_parameters_leave_unused_is_absent() {
+    const NODE: &str = "shaders/post/blur.ron";
+    let files = with(NODE, "Texture(format: R32Float, optional: true,", "Texture(format: R32Float, when: AtLeast(\"radius\", 8),");
+    let mask = |plan: &Plan| plan.nodes.iter().find(|n| n.id == "soft").unwrap().bindings[1].1;
+    // The node `show` has no mask and a radius of 1.
+    let used = try_plan(&files, &set(&[("radius", "8")])).unwrap();
+    assert_eq!(mask(&used), Target::Resource(used.resource("pyramid").unwrap()));
+    let plan = try_plan(&files, &input()).unwrap();
+    assert_eq!((mask(&plan), plan.resource("pyramid")), (Target::Absent, None));
+    assert_eq!(ids(&plan), ["paint", "soft", "show"]);
+    assert!(plan.idle.iter().any(|n| n.id == "pyramid" && n.reason == Idle::Dead));
+    // Where it is used it must be there, as it is not optional.
+    let faults = try_plan(&files, &set(&[("show.radius", "8")])).unwrap_err();
+    let parts =
+        ["the input `mask` of `show` is not connected", "which is used with these parameters", "set the node's parameters otherwise"];
+    assert_faults(&faults.render(), 1, &parts);
+    let off = edit(files, FILE, "node: \"post/pyramid\"", "node: \"post/pyramid\", when: AtLeast(\"count\", 200)");
+    assert!(try_plan(&off, &input()).is_ok());
+    let faults = try_plan(&off, &set(&[("radius", "8")])).unwrap_err();
+    assert_faults(&faults.render(), 1, &["`pyramid` is read, but not written in this frame: node `pyramid`, which writes it, is off"]);
+}
+
+/// A draw leaves out the target that nobody asked for; the places of the others stay.
+#[test]
+fn an_optional_output_that_nobody_reads_is_not_made() {
+    let ron = "shaders/draw/scene.ron";
+    let files = with(ron, "outputs: {", "outputs: { \"gloss\": Texture(format: Rgba16Float, optional: true, doc: \"gloss\"),");
+    let files = edit(files, ron, "targets: [", "targets: [\"gloss\", ");
+    let files = edit(
+        files,
+        "shaders/draw/scene.wgsl",
+        "@fragment\nfn fs() -> @location(0) vec4f {\n    return vec4f(1.0);\n}",
+        "struct Out { @location(0) gloss: vec4f, @location(1) albedo: vec4f }\n@fragment\nfn fs() -> Out { return Out(vec4f(1.0), vec4f(2.0)); }",
+    );
+    let files = edit(files, FILE, "resources: {", "resources: { \"gloss\": Texture(format: Rgba16Float, size: Output),");
+    let targets = |plan: &Plan| match &plan.nodes[0].steps[0] {
+        PlanStep::Draw { targets, .. } => targets.clone(),
+        other => panic!("{other:?}"),
+    };
+    let hard = set(&[("blur", "false")]);
+    let plan = try_plan(&files, &hard).unwrap();
+    assert_eq!(targets(&plan), [None, plan.resource("albedo")]);
+    assert_eq!(plan.resource("gloss"), None);
+    for keep in [vec!["gloss".to_owned()], Vec::new()] {
+        let read =
+            if keep.is_empty() { edit(files.clone(), FILE, "{\"source\": \"albedo\"}", "{\"source\": \"gloss\"}") } else { files.clone() };
+        let plan = try_plan(&read, &PlanInput { keep: keep.clone(), ..hard.clone() }).unwrap();
+        assert_eq!(targets(&plan), [plan.resource("gloss"), plan.resource("albedo")], "{keep:?}");
+        assert!(plan.resource("gloss").is_some());
+    }
 }
 
 #[test]

@@ -75,10 +75,7 @@ pub fn of_plan(plan: &Plan) -> Vec<NodeState> {
         node: node.decl.name.clone(),
         stage: node.stage.clone(),
         state: State::Runs,
-        reason: match &node.because {
-            Some(because) => format!("{}; its condition holds: {because}", readers(plan, node)),
-            None => readers(plan, node),
-        },
+        reason: reason(plan, node),
         condition: node.because.clone(),
         changed: None,
         unchanged: None,
@@ -92,6 +89,13 @@ pub fn of_plan(plan: &Plan) -> Vec<NodeState> {
         NodeState { id, node: node.kind.clone(), stage, state, reason, condition, changed: None, unchanged: None }
     });
     running.chain(idle).collect()
+}
+
+/// Who reads what a node writes, why its condition holds, and what conditions chose.
+fn reason(plan: &Plan, node: &PlanNode) -> String {
+    let condition = node.because.iter().map(|because| format!("; its condition holds: {because}"));
+    let chosen = node.chosen.iter().map(|chosen| format!("; with {} {}: {}", chosen.param, chosen.value, chosen.because));
+    condition.chain(chosen).fold(readers(plan, node), |all, part| all + &part)
 }
 
 /// As [`of_plan`], with what became of the nodes in the latest frame.
