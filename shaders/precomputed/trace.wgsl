@@ -20,6 +20,7 @@ struct Params {
 
 override component_is_direct: bool;
 override component_is_one_bounce: bool;
+override component_is_two_bounces: bool;
 override component_is_indirect: bool;
 override component_is_sky: bool;
 override component_is_full: bool;
@@ -47,8 +48,8 @@ fn trace(@builtin(global_invocation_id) id: vec3u) {
     if texel.triangle == NO_TRIANGLE {
         return;
     }
-    let bounces = select(params.max_bounces, 1u, component_is_one_bounce);
-    let lights = component_is_one_bounce || component_is_indirect || component_is_full;
+    let bounces = select(select(params.max_bounces, 2u, component_is_two_bounces), 1u, component_is_one_bounce);
+    let lights = component_is_one_bounce || component_is_two_bounces || component_is_indirect || component_is_full;
     let what = Gathered(lights, component_is_sky || component_is_full, bounces);
     var sum: vec4f;
     for (var i = 0u; i < 4u; i++) {

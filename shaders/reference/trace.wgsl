@@ -21,6 +21,7 @@ struct Params {
 
 override component_is_direct: bool;
 override component_is_one_bounce: bool;
+override component_is_two_bounces: bool;
 override component_is_indirect: bool;
 override component_is_sky: bool;
 override component_is_full: bool;
@@ -33,8 +34,9 @@ fn path(pixel: vec2u, size: vec2u) -> vec3f {
     if hit.t >= MISSED {
         return select(vec3f(0.0), sky_radiance(ray.direction), has_sky);
     }
-    let bounces = select(params.max_bounces, 1u, component_is_one_bounce);
-    let what = Gathered(component_is_one_bounce || component_is_indirect || component_is_full, has_sky, bounces);
+    let bounces = select(select(params.max_bounces, 2u, component_is_two_bounces), 1u, component_is_one_bounce);
+    let has_lights = component_is_one_bounce || component_is_two_bounces || component_is_indirect || component_is_full;
+    let what = Gathered(has_lights, has_sky, bounces);
     return light_of(surface_at(ray, hit), component_is_direct || component_is_full, what);
 }
 
