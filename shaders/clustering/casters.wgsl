@@ -41,7 +41,7 @@ fn start(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) grou
     if k >= arrayLength(&casters) {
         return;
     }
-    // Without overflow: both numbers are at most 4096.
+    // Without overflow: there are at most 4096 casters, and twice as many lights.
     casters[k] = clusters[k * arrayLength(&clusters) / arrayLength(&casters)];
 }
 

@@ -31,6 +31,9 @@ struct Params {
 @group(0) @binding(11) var importance_map: texture_storage_2d<r32float, write>;
 @group(0) @binding(12) var<storage, read> lit_texel_groups: array<vec4u>;
 
+override specular: bool;
+override view_importance: bool;
+
 const MAX_SAMPLES: u32 = 256u;
 const LANES: u32 = 256u;
 
@@ -51,7 +54,7 @@ fn gather_samples(lane: u32) {
 }
 
 // Mean cosine at the sampled positions towards a lit point. [ACRSM] eq. 4.2
-fn view_importance(lit: vec3f, lit_normal: vec3f) -> f32 {
+fn seen_importance(lit: vec3f, lit_normal: vec3f) -> f32 {
     var sum = 0.0;
     for (var i = 0u; i < params.view_samples; i++) {
         let to_lit = lit - sample_position[i];
@@ -72,7 +75,11 @@ fn clear(@builtin(global_invocation_id) id: vec3u) {
 
 @compute @workgroup_size(LANES)
 fn estimate(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u, @builtin(local_invocation_index) lane: u32) {
-    if params.view_weight > 0.0 {
+    var view_weight = 0.0;
+    if view_importance {
+        view_weight = params.view_weight;
+    }
+    if view_weight > 0.0 {
         gather_samples(lane);
     }
     workgroupBarrier();
@@ -86,14 +93,17 @@ fn estimate(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups
     let source = scene_lights[view.light];
     let ray = texel_ray(texel, rsm_size);
     let light = source.strength / max(max_component(source.strength), 1e-30) * saturate(falloff(source, ray.direction));
-    let specular = textureLoad(rsm_specular, texel, 0);
+    var lobe = vec4f(0.0);
+    if specular {
+        lobe = textureLoad(rsm_specular, texel, 0);
+    }
     let f_d = max_component(textureLoad(rsm_albedo, texel, 0).rgb * light); // [ACRSM] eq. 5.1
-    let f_s = max_component(specular.rgb * light) * saturate(specular.a / params.shininess_scale); // [ACRSM] eq. 5.2
+    let f_s = max_component(lobe.rgb * light) * saturate(lobe.a / params.shininess_scale); // [ACRSM] eq. 5.2
     let brdf = f_d * params.diffuse_weight + f_s * (1.0 - params.diffuse_weight); // [ACRSM] eq. 4.1
-    var importance = (1.0 - params.view_weight) * brdf;
-    if params.view_weight > 0.0 {
+    var importance = (1.0 - view_weight) * brdf;
+    if view_weight > 0.0 {
         let lit = ray.origin + ray.direction * textureLoad(rsm_distance, texel, 0).x;
-        importance += params.view_weight * view_importance(lit, unpack_unit(textureLoad(rsm_normal, texel, 0).x)); // [ACRSM] eq. 4.3
+        importance += view_weight * seen_importance(lit, unpack_unit(textureLoad(rsm_normal, texel, 0).x)); // [ACRSM] eq. 4.3
     }
     // Lights share the virtual lights by what their texels can reflect.
     importance *= view.weight;

@@ -26,6 +26,9 @@ struct Params {
 @group(0) @binding(7) var<uniform> params: Params;
 @group(0) @binding(8) var direct: texture_storage_2d<rgba32float, write>;
 
+override specular: bool;
+override direct_shadows: bool;
+
 // Share of pcf × pcf texels around the receiver, in its cell, that see it.
 fn shadow(index: u32, position: vec3f, normal: vec3f) -> f32 {
     let size = textureDimensions(rsm_distance);
@@ -65,7 +68,10 @@ fn light(@builtin(global_invocation_id) id: vec3u) {
         let direction = pixel_direction(scene_camera, id.xy, size);
         let position = scene_camera.origin + distance * direction;
         let normal = unpack_unit(textureLoad(gbuffer_normal, id.xy, 0).x);
-        let specular = textureLoad(gbuffer_specular, id.xy, 0);
+        var lobe = vec4f(0.0);
+        if specular {
+            lobe = textureLoad(gbuffer_specular, id.xy, 0);
+        }
         let albedo = textureLoad(gbuffer_albedo, id.xy, 0).rgb;
         for (var index = 0u; index < view_count(); index += views_of_light(index)) {
             let arrival = light_at(scene_lights[scene_light_views[index].light], position);
@@ -73,8 +79,11 @@ fn light(@builtin(global_invocation_id) id: vec3u) {
             if cosine <= 0.0 || max_component(arrival.irradiance) <= 0.0 {
                 continue;
             }
-            let visible = shadow(view_towards(index, position), position, normal);
-            let brdf = lambert_blinn(albedo, specular.rgb, specular.a, normal, arrival.to_light, -direction);
+            var visible = 1.0;
+            if direct_shadows {
+                visible = shadow(view_towards(index, position), position, normal);
+            }
+            let brdf = lambert_blinn(albedo, lobe.rgb, lobe.a, normal, arrival.to_light, -direction);
             radiance += brdf * arrival.irradiance * (cosine * visible); // methods: radiometry
             let irradiance = luminance(arrival.irradiance) * cosine;
             arriving += irradiance * visible;

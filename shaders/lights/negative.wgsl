@@ -1,9 +1,9 @@
-// Negative lights: what virtual lights without shadows light through surfaces is taken away again. [SOI] 3.3.
+// All virtual lights in one buffer, and negative ones behind them: what virtual lights without shadows light through surfaces is taken away again. [SOI] 3.3.
 // Points of a Halton sequence in the picture are surfaces p. What reaches p from behind, E = Σ Φ_c max(−n·t, 0) cosθ_c / (π d² + A_c), would have been
 // stopped there, but lights what is in front of p. A light at p with flux −E A_p takes it away, A_p being the visible surface that p stands for: area
 // of a pixel times pixels per sample. It shines along the mean way of that light, weighted by E.
 // The paper leaves open how much a negative light takes away and whether its direction is towards or from the lights; this is what conserves energy.
-// What bounds it: a negative light looks at all lights (at most 4096 rounds), and has one invocation.
+// What bounds it: a negative light looks at all other lights (at most 8192 rounds), and has one invocation.
 
 #import common::cluster::{Cluster, CLUSTER_ACTIVE}
 #import common::dispatch::linear_index
@@ -16,6 +16,7 @@
 #import common::view::{pixel_direction, pixel_solid_angle}
 
 struct Params {
+    second_lights: u32,
     negative_strength: f32,
     vpl_clamp: f32,
     tiles: u32,
@@ -28,11 +29,24 @@ struct Params {
 @group(0) @binding(4) var gbuffer_distance: texture_2d<f32>;
 @group(0) @binding(5) var<uniform> params: Params;
 @group(0) @binding(6) var<storage, read_write> virtual_lights: array<Cluster>;
+@group(0) @binding(7) var<storage, read> second_bounce: array<Cluster>;
 
 override lights_is_val: bool;
 
 // Luminance, W/m², below which the direction of light is lost in rounding.
 const LEAST_LIGHT: f32 = 1e-30;
+
+fn positive_lights() -> u32 {
+    return arrayLength(&clusters) + params.second_lights;
+}
+
+fn positive_light(i: u32) -> Cluster {
+    let first = arrayLength(&clusters);
+    if i < first {
+        return clusters[i];
+    }
+    return second_bounce[i - first];
+}
 
 // Light that arrives at the back of a surface.
 struct Behind {
@@ -43,8 +57,8 @@ struct Behind {
 fn light_behind(position: vec3f, normal: vec3f) -> Behind {
     let least_distance = params.vpl_clamp * scene_info.diagonal;
     var sum = Behind(vec3f(0.0), vec3f(0.0));
-    for (var c = 0u; c < arrayLength(&clusters); c++) {
-        let cluster = clusters[c];
+    for (var c = 0u; c < positive_lights(); c++) {
+        let cluster = positive_light(c);
         if cluster.state != CLUSTER_ACTIVE || cluster.count == 0u {
             continue;
         }
@@ -93,10 +107,10 @@ fn negative_light(i: u32, count: u32) -> Cluster {
 @compute @workgroup_size(64)
 fn append(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     let i = linear_index(id, groups, 64u);
-    let positive = arrayLength(&clusters);
+    let positive = positive_lights();
     let all = arrayLength(&virtual_lights);
     if i < positive {
-        virtual_lights[i] = clusters[i];
+        virtual_lights[i] = positive_light(i);
     } else if i < all {
         virtual_lights[i] = negative_light(i - positive, all - positive);
     }

@@ -58,7 +58,7 @@ fn the_flux_of_the_clusters_is_the_flux_of_the_map() {
 /// A buffer of clusters has as many elements as there are: a change of their number is another buffer, and what has room in it stays.
 #[test]
 fn clusters_survive_a_change_of_their_number() {
-    let mut renderer = job().set("clusters", 16).set("adaptive", false).keep(&["clusters_evaluated"]).render();
+    let mut renderer = job().set("clusters", 16).set("adaptive", "off").keep(&["clusters_evaluated"]).render();
     for (number, least_active) in [(128, 64), (24, 12)] {
         let before = read_clusters(&renderer, "clusters");
         renderer.set_parameter("clusters", &number.to_string()).unwrap_or_else(|e| panic!("{e}"));
