@@ -58,11 +58,16 @@ fn corner_in_world(index: u32) -> Corner {
     return out;
 }
 
-// What a surface is to a viewer, `to_viewer` being of any length. Where textures are sampled, control flow must be uniform.
-fn describe_surface(in: Corner, to_viewer: vec3f, distance: f32) -> Surface {
+// What a surface is to a viewer, `to_viewer` being of any length. Where textures are sampled, control flow must be uniform; whether they are, `textured`, is
+// a constant.
+fn describe_surface(in: Corner, to_viewer: vec3f, distance: f32, textured: bool) -> Surface {
     let material = scene_materials[in.material];
-    // Derivatives need uniform control flow: sample first, then decide.
-    let texel = textureSample(scene_textures, linear_repeat_sampler, in.uv, min(material.diffuse_texture, textureNumLayers(scene_textures) - 1u));
+    var albedo = material.diffuse;
+    if textured {
+        // Derivatives need uniform control flow: sample first, then decide.
+        let texel = textureSample(scene_textures, linear_repeat_sampler, in.uv, min(material.diffuse_texture, textureNumLayers(scene_textures) - 1u));
+        albedo *= select(vec3f(1.0), texel.rgb, material.diffuse_texture != NO_TEXTURE);
+    }
 
     // A shading normal may be absent or cancel between corners; the flat one is the truth then.
     var normal = select(in.flat_normal, in.normal, dot(in.normal, in.normal) > 0.0);
@@ -72,8 +77,7 @@ fn describe_surface(in: Corner, to_viewer: vec3f, distance: f32) -> Surface {
     normal = select(-normal, normal, dot(normal, facing) >= 0.0);
 
     var out: Surface;
-    let tint = select(vec3f(1.0), texel.rgb, material.diffuse_texture != NO_TEXTURE);
-    out.albedo = vec4f(material.diffuse * tint, 1.0);
+    out.albedo = vec4f(albedo, 1.0);
     out.specular = vec4f(material.specular, material.shininess);
     out.normal = pack_unit(normal);
     out.distance = distance;

@@ -11,6 +11,8 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> params: Params;
 
+override textures: bool;
+
 @vertex
 fn project(@builtin(vertex_index) index: u32, @builtin(instance_index) viewer: u32) -> Corner {
     var corner = corner_in_world(index);
@@ -32,7 +34,7 @@ fn describe(in: Corner) -> Surface {
         distance = -dot(to_viewer, view.forward);
         to_viewer = -view.forward;
     }
-    let surface = describe_surface(in, to_viewer, distance);
+    let surface = describe_surface(in, to_viewer, distance, textures);
     if any(vec2u(in.clip.xy) / params.rsm_size != cell_of_view(in.viewer)) {
         discard;
     }

@@ -5,6 +5,8 @@
 
 @group(0) @binding(0) var<uniform> view: View;
 
+override textures: bool;
+
 @vertex
 fn project(@builtin(vertex_index) index: u32) -> Corner {
     var corner = corner_in_world(index);
@@ -15,5 +17,5 @@ fn project(@builtin(vertex_index) index: u32) -> Corner {
 @fragment
 fn describe(in: Corner) -> Surface {
     let to_viewer = view.origin - in.world;
-    return describe_surface(in, to_viewer, length(to_viewer));
+    return describe_surface(in, to_viewer, length(to_viewer), textures);
 }
