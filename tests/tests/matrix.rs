@@ -34,7 +34,7 @@ const SMALL: i64 = 32;
 /// The same of counts, which are room for what a scene asks for: with less, a node may say that it needs more.
 const SMALL_COUNT: i64 = 16_384;
 /// Of larger products, so many combinations are planned, chosen evenly.
-const MOST_PLANNED: usize = 100_000;
+const MOST_PLANNED: usize = 20_000;
 /// So many where another pipeline of the same stages has all of them: only the numbers differ.
 const MOST_AGAIN: usize = 1_000;
 /// Combinations that are looked at to find the next one to render.

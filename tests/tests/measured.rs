@@ -296,7 +296,7 @@ fn the_command_line_measures_scenes_and_keeps_what_it_measured() {
         text.lines().find(|line| line.starts_with("bvh ")).map(str::to_owned).unwrap_or_default()
     };
     let kept = || fs::read_dir(cache.join("manylight/measures")).map_or(0, Iterator::count);
-    explain("rsm_gather", "cornell");
+    explain("reference", "cornell");
     assert_eq!(kept(), 0, "that pipeline asks for nothing that is measured");
     let (open, empty) = (explain("asks", "cornell"), explain("asks", "cornell_empty"));
     println!("{open}\n{empty}");

@@ -70,7 +70,7 @@ fn the_path_tracer_agrees_with_another_renderer() {
     ];
     if let Some(shared) = shared() {
         let scene = |name: &str| (shared.join("scenes").join(name).join(format!("{name}.ron")), shared.join("reference").join(name));
-        for (name, component, frames) in [("cornell_objects", ONE_BOUNCE, 8), ("sponza", DIRECT, 6), ("sponza", ONE_BOUNCE, 6)] {
+        for (name, component, frames) in [("cornell_objects", ONE_BOUNCE, 8), ("sponza", DIRECT, 6), ("sponza", ONE_BOUNCE, 12)] {
             let (file, reference) = scene(name);
             cases.push(case(file, reference, component, frames));
         }

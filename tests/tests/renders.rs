@@ -7,7 +7,7 @@ use std::{
 
 use half::f16;
 use manylight_gpu::{Gpu, GpuOptions, Image};
-use manylight_graph::{library::Library, plan::Debug};
+use manylight_graph::{library::Library, params::Literal, pipeline::Pipeline, plan::Debug, registry::Param, value::Value};
 use manylight_passes::{
     Baked, Documents, Renderer, SceneSource, Settings,
     baked::{CORNERS, Header, Lookup, NOWHERE, hash_of},
@@ -98,7 +98,10 @@ impl Job {
             baked: self.baked.clone(),
         };
         let library = Library::new(Some(self.root.clone()), Vec::new());
-        Renderer::new(gpu(), library, &self.pipeline, SceneSource::file(&self.scene), settings).unwrap_or_else(|e| panic!("{e}"))
+        // What is measured of a scene is the same for all tests.
+        let measures = Path::new(env!("CARGO_TARGET_TMPDIR")).join("measures");
+        let scene = SceneSource::file(&self.scene).keeping_measures_in(Some(measures));
+        Renderer::new(gpu(), library, &self.pipeline, scene, settings).unwrap_or_else(|e| panic!("{e}"))
     }
 
     /// A renderer after `frames` frames at time 0.
@@ -116,6 +119,16 @@ impl Job {
 #[track_caller]
 pub fn read(renderer: &Renderer, resource: &str) -> Image {
     renderer.read(resource).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Settings of a pipeline that leave nothing out: `on` for each switch that would be decided from the scene.
+pub fn nothing_left_out(pipeline: &Pipeline) -> Vec<(String, String)> {
+    let by_itself = |name: &str, param: &Param| match pipeline.set.get(name) {
+        Some(preset) => preset.value == Literal::Text("auto".to_owned()),
+        None => param.kind.default_value() == Value::Choice("auto".to_owned()),
+    };
+    let switches = pipeline.params.iter().filter(|(name, param)| param.kind.is_switch() && by_itself(name, param));
+    switches.map(|(name, _)| (name.clone(), "on".to_owned())).collect()
 }
 
 /// Whether a pipeline shows light that was traced before: then its picture is what the file says.

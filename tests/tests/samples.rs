@@ -63,7 +63,10 @@ fn the_flux_of_samples_is_unbiased() {
 fn samples_with_exact_visibility_converge_to_the_reference() {
     let scene = &scenes()[0];
     let reference = exr(&scene.reference.join("onebounce.exr"));
-    let job = || Job::scene(&scene.file).frames(1).set("sampling", "samples").set("visibility", "exact").keep(&["indirect"]);
+    let job = || {
+        let job = Job::scene(&scene.file).frames(1).set("sampling", "samples").set("view_importance", "on");
+        job.set("visibility", "exact").keep(&["indirect"])
+    };
     let errors = [(64, 0.16), (256, 0.07)].map(|(count, most)| {
         let points = job().set("clusters", count).set("lights", "vpl").set("indirect.vpl_clamp", 0.0).set("tiles", 1);
         let (mae, energy) = error(&read(&points.render(), "indirect"), &reference);

@@ -44,6 +44,20 @@ const CHANGES: &[Change] = &[
     Change::Set("sampling", "samples"),
     Change::Set("sampling", "incremental"),
     Change::Set("sampling", "clusters"),
+    Change::Set("indirect_shadows", "off"),
+    Change::Set("indirect_shadows", "auto"),
+    Change::Set("direct_shadows", "off"),
+    Change::Set("direct_shadows", "auto"),
+    Change::Set("specular", "on"),
+    Change::Set("specular", "auto"),
+    Change::Set("view_importance", "on"),
+    Change::Set("view_importance", "auto"),
+    Change::Set("second_bounce", "on"),
+    Change::Set("second_bounce", "off"),
+    Change::Set("adaptive", "auto"),
+    Change::Set("adaptive", "off"),
+    Change::Set("points", "dynamic"),
+    Change::Set("points", "auto"),
     Change::Set("view", "clusters"),
     Change::Set("view", "final"),
     Change::Shader("shaders/lighting/compose.wgsl", "textureStore(composed", "textureStore( composed"),
@@ -93,7 +107,7 @@ fn skipping_changes_no_bit() {
         if chance.below(3) > 0 {
             time += 0.1 * chance.below(4) as f64;
         }
-        if chance.below(9) == 0 {
+        if chance.below(5) == 0 {
             let change = &CHANGES[chance.below(CHANGES.len())];
             if let Change::Shader(file, from, to) = change {
                 let path = project.path().join(file);
@@ -112,7 +126,7 @@ fn skipping_changes_no_bit() {
         assert!(bits(&all) == bits(&skipping), "frame {frame} at {time} s differs");
     }
     println!("{skipped} nodes skipped in {FRAMES} frames with {applied} changes");
-    assert!(skipped > 1000 && applied > 10);
+    assert!(skipped > 1000 && applied > 30);
 }
 
 /// Ids of the nodes that ran.
@@ -153,12 +167,16 @@ fn only_what_depends_on_a_change_runs() {
 /// Every pipeline comes to rest in a scene that stands still, but for one that goes on for ever by its nature.
 #[test]
 fn still_frames_cost_nothing() {
-    for (pipeline, _) in documents_of_all_pipelines() {
+    for (pipeline, documents) in documents_of_all_pipelines() {
         if pipeline.ends_with("/precomputed.ron") {
             continue;
         }
         let pipeline_path = root().join(&pipeline).to_string_lossy().into_owned();
-        let mut renderer = Job { pipeline: pipeline_path, size: (32, 32), skip_unchanged: true, ..Job::asset("cornell") }.renderer();
+        let job = Job { pipeline: pipeline_path, size: (32, 32), skip_unchanged: true, ..Job::asset("cornell") };
+        // Whether nodes rest does not depend on how much they do.
+        let small = [("rsm_size", 64), ("point_count", 2000)];
+        let small = small.into_iter().filter(|(name, _)| documents.pipeline().params.contains_key(*name));
+        let mut renderer = small.fold(job, |job, (name, value)| job.set(name, value)).renderer();
         for _ in 0..40 {
             renderer.render_frame(0.0).unwrap_or_else(|e| panic!("{e}"));
         }
