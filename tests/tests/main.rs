@@ -15,6 +15,7 @@ mod faults;
 mod functions;
 mod fuzz;
 mod gather;
+mod gltf;
 mod hard_scenes;
 mod incremental;
 mod light_kinds;

@@ -68,7 +68,7 @@ pub fn cache(name: &str) -> Option<PathBuf> {
     etcetera::choose_base_strategy().ok().map(|strategy| strategy.cache_dir().join("manylight").join(name))
 }
 
-/// A scene by path (`rooms/hall.ron`, `mesh.obj`) or by name in `assets/` (`cornell`), on disk or embedded. What is measured of it is kept in the user's
+/// A scene by path (`rooms/hall.ron`, `mesh.obj`, `model.glb`) or by name in `assets/` (`cornell`), on disk or embedded. What is measured of it is kept in the user's
 /// cache.
 ///
 /// # Errors
@@ -79,7 +79,14 @@ pub fn scene(library: &Library, name: &str) -> Result<SceneSource, Fault> {
     }
     let plain = name.replace('\\', "/");
     let built_in = embedded("assets", &ASSETS);
-    for path in [plain.clone(), format!("assets/{plain}"), format!("assets/{plain}.ron"), format!("assets/{plain}.obj")] {
+    for path in [
+        plain.clone(),
+        format!("assets/{plain}"),
+        format!("assets/{plain}.ron"),
+        format!("assets/{plain}.obj"),
+        format!("assets/{plain}.gltf"),
+        format!("assets/{plain}.glb"),
+    ] {
         if let Some(file) = library.root().map(|root| root.join(&path)).filter(|file| file.is_file()) {
             return Ok(SceneSource::file(file).keeping_measures_in(cache("measures")));
         }
@@ -88,13 +95,13 @@ pub fn scene(library: &Library, name: &str) -> Result<SceneSource, Fault> {
         }
     }
     if Path::new(name).is_dir() {
-        return Err(Fault::Input(format!("the scene `{name}` is a folder: name a .ron or .obj file in it")));
+        return Err(Fault::Input(format!("the scene `{name}` is a folder: name a .ron, .obj, .gltf or .glb file in it")));
     }
     let known = scene_names(library);
     let help = match nearest(name, known.iter().map(String::as_str)) {
         Some(near) => format!("did you mean `{near}`?"),
-        None if known.is_empty() => "name a .ron or .obj file".to_owned(),
-        None => format!("name a .ron or .obj file, or one of {}", known.join(", ")),
+        None if known.is_empty() => "name a .ron, .obj, .gltf or .glb file".to_owned(),
+        None => format!("name a .ron, .obj, .gltf or .glb file, or one of {}", known.join(", ")),
     };
     Err(Fault::Input(format!("there is no scene `{name}`; {help}")))
 }

@@ -14,7 +14,7 @@ pub struct SceneSource {
 }
 
 impl SceneSource {
-    /// A `.ron` or `.obj` file on disk.
+    /// A `.ron`, `.obj`, `.gltf` or `.glb` file on disk.
     pub fn file(path: impl Into<PathBuf>) -> Self {
         Self { path: path.into(), ..Self::default() }
     }

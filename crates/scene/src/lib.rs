@@ -1,4 +1,4 @@
-//! Scenes for manylight: meshes, materials, textures, lights, a camera and their motion, read from RON, OBJ, MTL and picture files into
+//! Scenes for manylight: meshes, materials, textures, lights, a camera and their motion, read from RON, OBJ, MTL, glTF and picture files into
 //! the structures that shaders read.
 //!
 //! ```
@@ -31,7 +31,7 @@
 //! ```ron
 //! Scene(
 //!     meshes: [
-//!         "box.obj",                                     // relative to this file
+//!         "box.obj",                                     // relative to this file; or glTF: "box.glb"
 //!         Mesh(
 //!             file: "ball.obj",
 //!             name: "ball",

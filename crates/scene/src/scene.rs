@@ -26,7 +26,7 @@ use crate::{
 /// A mesh somewhere in the scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneObject {
-    /// As named in the scene file, else the stem of its mesh's file.
+    /// As named in the scene file, else the stem of its mesh's file; of glTF, the name of its node.
     pub name: String,
     /// Index of its mesh.
     pub mesh: usize,
@@ -75,7 +75,7 @@ pub enum LightShape {
 pub struct Scene {
     /// Stem of the file's name.
     pub name: String,
-    /// Meshes; each file once.
+    /// Meshes; each file once, or each mesh of a glTF file.
     pub meshes: Vec<Mesh>,
     /// Instances of meshes; at least one.
     pub objects: Vec<SceneObject>,
@@ -107,7 +107,7 @@ pub struct Scene {
 const ROOM_TO_GROW: usize = 4;
 
 impl Scene {
-    /// Loads a scene file (`.ron`) or a mesh (`.obj`) from disk.
+    /// Loads a scene file (`.ron`), a mesh (`.obj`) or a glTF file (`.gltf`, `.glb`) from disk.
     ///
     /// # Errors
     /// All faults of the scene file, and meshes that cannot be used.
@@ -115,7 +115,7 @@ impl Scene {
         Self::load_with(path, &Disk)
     }
 
-    /// Loads a scene file or a mesh from anywhere, for example from an [`Embedded`](crate::files::Embedded) set of files.
+    /// Loads a scene file, a mesh or a glTF file from anywhere, for example from an [`Embedded`](crate::files::Embedded) set of files.
     ///
     /// # Errors
     /// All faults of the scene file, and meshes that cannot be used.

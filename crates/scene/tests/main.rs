@@ -5,6 +5,7 @@
 mod assets;
 mod bvh;
 mod deform;
+mod gltf;
 mod gpu_data;
 mod import;
 mod measure;

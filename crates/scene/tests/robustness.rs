@@ -78,7 +78,7 @@ fn check(path: &str, obj: &[u8], mtl: &[u8], ron: &[u8]) -> Result<(), TestCaseE
 }
 
 /// It can be sampled, has points and a hierarchy, and gives finite numbers and indices in range.
-fn check_scene(scene: &Scene) -> Result<(), TestCaseError> {
+pub fn check_scene(scene: &Scene) -> Result<(), TestCaseError> {
     prop_assert!(!scene.warnings.has_errors());
     for time in [0.0, 0.7, 1e9] {
         let state = scene.sample(time);

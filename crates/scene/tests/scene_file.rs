@@ -263,7 +263,7 @@ fn a_file_on_disk_wins_over_an_embedded_one() {
 fn bytes_that_are_no_text_are_an_error() {
     let fault = load("s.ron", &[("s.ron", &[0xff_u8, 0xfe, 0x00][..])]).unwrap_err();
     assert_says(&fault, "", &["not a text in UTF-8"]);
-    assert_says(&load::<&str>("s.gltf", &[]).unwrap_err(), "", &["a scene is a `.ron` or an `.obj` file, not `.gltf`"]);
+    assert_says(&load::<&str>("s.fbx", &[]).unwrap_err(), "", &["a scene is a `.ron`, `.obj`, `.gltf` or `.glb` file, not `.fbx`"]);
 }
 
 /// Every example of the guide's page is a scene, or a part of one.

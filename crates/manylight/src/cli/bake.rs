@@ -36,7 +36,7 @@ pub enum LookupArg {
     manylight bake day --size 64x48 --report tables\n\
     A bake that was stopped goes on where it was: finished key frames are in the work folder.")]
 pub struct BakeArgs {
-    /// A scene: a path to a .ron or .obj file, or a name such as `day`
+    /// A scene: a path to a .ron, .obj, .gltf or .glb file, or a name such as `day`
     #[arg(value_name = "SCENE")]
     pub scene: String,
     /// Write baked light to this file

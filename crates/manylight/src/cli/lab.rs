@@ -71,7 +71,7 @@ pub struct SweepArgs {
 pub struct TuneArgs {
     /// A pipeline: a path to a .ron file, or a name such as `acrsm`
     pub pipeline: String,
-    /// A scene: a path to a .ron or .obj file, or a name such as `cornell`
+    /// A scene: a path to a .ron, .obj, .gltf or .glb file, or a name such as `cornell`
     #[arg(long, value_name = "SCENE")]
     pub scene: String,
     /// Find the most accurate setting within this time a frame

@@ -104,7 +104,7 @@ pub struct DebugArgs {
 /// What to render with and how.
 #[derive(Debug, Args)]
 pub struct FrameArgs {
-    /// A scene: a path to a .ron or .obj file, or a name such as `cornell`
+    /// A scene: a path to a .ron, .obj, .gltf or .glb file, or a name such as `cornell`
     #[arg(long, value_name = "SCENE")]
     pub scene: String,
     #[command(flatten)]

@@ -129,7 +129,7 @@ impl Checker {
 
     fn file(&mut self, library: &Library, path: &Path) {
         let is = |extension: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
-        if is("obj") {
+        if is("obj") || is("gltf") || is("glb") {
             return self.scene(path);
         }
         let document = if is("wgsl") { Ok(Document::Node) } else { kind_of(path) };

@@ -19,7 +19,7 @@ use crate::{
     deform::{Deformation, Metaballs, Room},
     files::{FileReader, Files, beside, cannot_read, without_dots},
     fit,
-    import::{Material, Mesh, MeshTriangle, TextureSet, import_obj, nowhere},
+    import::{GltfScene, Material, Mesh, MeshTriangle, TextureSet, import_gltf, import_gltf_mesh, import_obj, is_gltf, nowhere},
     measure::Memo,
     motion::{Pose, Track},
     scene::{Light, Scene, SceneObject},
@@ -53,10 +53,11 @@ pub(crate) fn load(path: &Path, reader: &dyn FileReader) -> Result<Scene, Diagno
             };
             loader.finish(stem.clone(), Document::default(), vec![(stem, mesh, Track::fixed(Pose::default()))])
         }
+        Some("gltf" | "glb") => loader.gltf(path, stem),
         Some("ron") | None => loader.scene(path, stem),
         Some(other) => {
-            let message = format!("cannot load `{}`: a scene is a `.ron` or an `.obj` file, not `.{other}`", path.display());
-            Err(Diagnostics(vec![Diagnostic::error_nowhere(message).help("export the mesh as Wavefront OBJ")]))
+            let message = format!("cannot load `{}`: a scene is a `.ron`, `.obj`, `.gltf` or `.glb` file, not `.{other}`", path.display());
+            Err(Diagnostics(vec![Diagnostic::error_nowhere(message).help("export the mesh as glTF or as Wavefront OBJ")]))
         }
     }
 }
@@ -81,6 +82,18 @@ fn difference(a: &Mesh, b: &Mesh) -> Option<String> {
     )
 }
 
+/// Reads a mesh from a file of any kind.
+fn import(
+    path: &Path,
+    files: &mut Files<'_>,
+    materials: &mut Vec<Material>,
+    textures: &mut TextureSet,
+    warnings: &mut Diagnostics,
+) -> Result<Mesh, Diagnostic> {
+    let import = if is_gltf(path) { import_gltf_mesh } else { import_obj };
+    import(path, files, materials, textures, warnings)
+}
+
 /// What is loaded so far.
 struct Loader<'a> {
     files: Files<'a>,
@@ -98,7 +111,8 @@ impl Loader<'_> {
         let bytes = self.files.read(path).map_err(|error| fail(cannot_read(path, &error)))?;
         let Ok(text) = String::from_utf8(bytes) else {
             return Err(Diagnostics(vec![
-                Diagnostic::error_nowhere(format!("`{}` is not a text in UTF-8", path.display())).help("a scene is a RON or an OBJ file"),
+                Diagnostic::error_nowhere(format!("`{}` is not a text in UTF-8", path.display()))
+                    .help("a scene is a RON, OBJ or glTF file"),
             ]));
         };
         let source = Arc::new(Source { name: path.display().to_string(), path: Some(path.to_owned()), text: text.into() });
@@ -146,13 +160,29 @@ impl Loader<'_> {
         self.finish(stem, document, objects)
     }
 
+    /// A glTF file as a scene of its own.
+    fn gltf(mut self, path: &Path, stem: String) -> Result<Scene, Diagnostics> {
+        match import_gltf(path, &mut self.files, &mut self.materials, &mut self.textures, &mut self.out) {
+            Ok(GltfScene { meshes, objects, camera, lights }) => {
+                self.meshes = meshes;
+                let lights = Some(lights).filter(|lights| !lights.is_empty());
+                self.finish(stem, Document { camera, lights, ..Document::default() }, objects)
+            }
+            // What was left out tells why nothing remained.
+            Err(fault) => {
+                self.out.0.push(fault);
+                Err(self.out.sorted())
+            }
+        }
+    }
+
     /// The index of the mesh of a file.
     fn mesh(&mut self, path: &Path) -> Result<usize, Diagnostic> {
         let name = path.display().to_string();
         if let Some(known) = self.meshes.iter().position(|mesh| mesh.name == name && mesh.deformation.is_none()) {
             return Ok(known);
         }
-        let mesh = import_obj(path, &mut self.files, &mut self.materials, &mut self.textures, &mut self.out)?;
+        let mesh = import(path, &mut self.files, &mut self.materials, &mut self.textures, &mut self.out)?;
         Ok(self.add(mesh))
     }
 
@@ -164,7 +194,7 @@ impl Loader<'_> {
     /// The index of a mesh with the vertices of other files at some times. Materials, triangles and texture coordinates are those of `file`.
     fn keyed_mesh(&mut self, path: &Path, file: &Spanned, keys: &Track<Spanned>) -> Result<usize, Diagnostic> {
         let first = beside(path, &file.text);
-        let mesh = import_obj(&first, &mut self.files, &mut self.materials, &mut self.textures, &mut self.out);
+        let mesh = import(&first, &mut self.files, &mut self.materials, &mut self.textures, &mut self.out);
         let mesh = mesh.map_err(|fault| at(fault, file))?;
         let mut shapes = HashMap::from([(first.clone(), mesh.vertices.clone())]);
         for (_, key) in keys.keys() {
@@ -173,7 +203,7 @@ impl Loader<'_> {
                 continue;
             }
             // Only its vertices matter.
-            let shape = import_obj(&other, &mut self.files, &mut Vec::new(), &mut TextureSet::default(), &mut self.out);
+            let shape = import(&other, &mut self.files, &mut Vec::new(), &mut TextureSet::default(), &mut self.out);
             let shape = shape.map_err(|fault| at(fault, key))?;
             if let Some(difference) = difference(&mesh, &shape) {
                 let message = format!("`{}` cannot be a key frame of `{}`: {difference}", other.display(), first.display());

@@ -3,7 +3,9 @@
 use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
+use manylight_graph::diagnostics::Diagnostics;
 
+use super::nowhere;
 use crate::{
     bounds::Bounds,
     deform::{Deformation, Room, mixed},
@@ -22,7 +24,7 @@ pub struct MeshTriangle {
 /// Triangles in a space of their own. In a mesh from a file every triangle has an area, and no two are equal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
-    /// Its file, as named in the scene.
+    /// Its file, as named in the scene; with its place in it (`a.glb#meshes[0]`) if there are several.
     pub name: String,
     /// Vertices; all finite where a triangle uses them. Of a mesh that deforms: at time 0.
     pub vertices: Vec<Vertex>,
@@ -77,6 +79,20 @@ pub(super) struct LeftOut {
     pub(super) flat: usize,
     /// The same positions as an earlier one, in any order.
     pub(super) repeated: usize,
+}
+
+impl LeftOut {
+    /// A warning for each kind.
+    pub(super) fn report(self, name: &str, warnings: &mut Diagnostics) {
+        let mut warn = |count: usize, what: &str| {
+            if count > 0 {
+                warnings.0.push(nowhere(format!("`{name}`: {count} triangles {what} and are left out")));
+            }
+        };
+        warn(self.not_finite, "have vertices that are not finite");
+        warn(self.flat, "have no area");
+        warn(self.repeated, "repeat another one");
+    }
 }
 
 /// Share of the square of the longest edge below which an area is rounding noise of 32-bit coordinates: such a triangle has no normal.

@@ -1,13 +1,15 @@
-//! Meshes, materials and textures from OBJ, MTL and image files. No input makes it panic: what can be mended is mended, counted and
+//! Meshes, materials and textures from OBJ, MTL, glTF and image files. No input makes it panic: what can be mended is mended, counted and
 //! reported as a warning.
 
 mod faults;
+mod gltf;
 mod mesh;
 mod mtl;
 mod obj;
 mod obj_text;
 mod texture;
 
+pub(crate) use self::gltf::{GltfScene, import_gltf, import_gltf_mesh, is_gltf};
 pub(crate) use faults::nowhere;
 pub use mesh::{Mesh, MeshStatistics, MeshTriangle};
 pub(crate) use mesh::{area, edges};
@@ -20,9 +22,9 @@ use glam::Vec3;
 /// A surface: Lambert and Blinn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
-    /// Name in the MTL file.
+    /// Name in the MTL or glTF file.
     pub name: String,
-    /// Linear albedo, Kd.
+    /// Linear albedo, Kd; of glTF the base colour of what is not metal.
     pub diffuse: Vec3,
     /// Layer of [`Textures`] that `diffuse` is multiplied with.
     pub texture: Option<u32>,

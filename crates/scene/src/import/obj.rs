@@ -51,14 +51,7 @@ pub(crate) fn import_obj(
         }
     }
     let (mesh, left_out) = Mesh::new(path.display().to_string(), vertices, triangles);
-    let mut warn = |count: usize, what: &str| {
-        if count > 0 {
-            warnings.0.push(nowhere(format!("`{}`: {count} triangles {what} and are left out", path.display())));
-        }
-    };
-    warn(left_out.not_finite, "have vertices that are not finite");
-    warn(left_out.flat, "have no area");
-    warn(left_out.repeated, "repeat another one");
+    left_out.report(&path.display().to_string(), warnings);
     mesh.ok_or_else(|| {
         Diagnostic::error_nowhere(format!("`{}` holds no triangle", path.display()))
             .help("a mesh is a Wavefront OBJ file with at least one face that has an area")

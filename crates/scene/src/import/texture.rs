@@ -6,6 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use glam::{DVec3, Vec3};
 use image::{ImageFormat, ImageReader, Limits, Rgba32FImage, RgbaImage, imageops};
 
 use crate::files::{Files, cannot_read};
@@ -56,15 +57,28 @@ impl TextureSet {
     /// # Errors
     /// What is wrong with it, as a sentence that names it.
     pub(crate) fn load(&mut self, path: &Path, files: &mut Files<'_>) -> Result<u32, String> {
+        self.load_from(path, || files.read(path).map_err(|error| cannot_read(path, &error)))
+    }
+
+    /// The layer of a picture that lies inside another file; `path` names it.
+    ///
+    /// # Errors
+    /// What is wrong with it, as a sentence that names it.
+    pub(crate) fn load_from(&mut self, path: &Path, bytes: impl FnOnce() -> Result<Vec<u8>, String>) -> Result<u32, String> {
         if let Some(known) = self.layers.get(path) {
             return known.clone();
         }
-        let layer = decode(path, files).map(|image| {
+        let layer = bytes().and_then(|bytes| decode(path, &bytes)).map(|image| {
             self.images.push(image);
             self.images.len() as u32 - 1
         });
         self.layers.insert(path.to_owned(), layer.clone());
         layer
+    }
+
+    /// Mean linear colour of a layer.
+    pub(crate) fn mean(&self, layer: u32) -> Vec3 {
+        self.images.get(layer as usize).map_or(Vec3::ONE, |image| mean(image, linear_from_srgb))
     }
 
     /// Brings all to one size and makes the mip levels.
@@ -93,12 +107,22 @@ impl TextureSet {
     }
 }
 
-/// Reads and decodes a picture; its format is told by its contents, else by the end of its name.
-fn decode(path: &Path, files: &mut Files<'_>) -> Result<RgbaImage, String> {
-    let bytes = files.read(path).map_err(|error| cannot_read(path, &error))?;
+/// Mean of a picture's first three channels, each value of which (0…1) goes through `convert`.
+pub(super) fn mean(image: &RgbaImage, convert: impl Fn(f32) -> f32) -> Vec3 {
+    let table: [f64; 256] = std::array::from_fn(|i| f64::from(convert(i as f32 / 255.0)));
+    let mut sum = DVec3::ZERO;
+    for texel in image.pixels() {
+        let [r, g, b, _] = texel.0;
+        sum += DVec3::new(table[r as usize], table[g as usize], table[b as usize]);
+    }
+    (sum / f64::from(image.width()) / f64::from(image.height())).as_vec3()
+}
+
+/// Decodes a picture; its format is told by its contents, else by the end of its name.
+pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<RgbaImage, String> {
     let fail = |reason: &dyn std::fmt::Display| format!("cannot read `{}`: {reason}", path.display());
-    let format = image::guess_format(&bytes).ok().or_else(|| ImageFormat::from_path(path).ok());
-    let mut reader = ImageReader::with_format(Cursor::new(&bytes), format.ok_or_else(|| fail(&"not a picture"))?);
+    let format = image::guess_format(bytes).ok().or_else(|| ImageFormat::from_path(path).ok());
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format.ok_or_else(|| fail(&"not a picture"))?);
     let mut limits = Limits::default();
     limits.max_image_width = Some(LARGEST_PICTURE);
     limits.max_image_height = Some(LARGEST_PICTURE);
