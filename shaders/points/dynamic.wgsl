@@ -2,14 +2,15 @@
 // weights per triangle, their prefix sum, and one invocation per point that looks its triangle up.
 // Weights: area, or the number of points of the paper's factors, (t_A + mean t_e)² / 2: the vertices of a triangle with that many
 // steps along each edge. Sums run in a fixed order. What bounds it: the binary search, 17 reads per point for 10⁵ triangles.
+// Points lie as those of `points/static` do: along a line through all triangles that fills each of them, one at a random place of each of as many
+// equal pieces, and pieces are shuffled in blocks. Every N-th point then samples all of the surface evenly, whatever N: point i belongs to map i mod N.
 
 #import common::scene::{Vertex, Triangle, Object, SceneInfo, Seed}
 #import common::points::{ScenePoint, WORLD_SPACE}
 #import common::dispatch::linear_index
-#import common::random::{radical_inverse_2, radical_inverse_3, hash3, unit_float}
+#import common::random::{hash3, unit_float}
 
 struct Params {
-    clusters: u32,
     f_min: u32,
     f_max: u32,
 }
@@ -145,6 +146,39 @@ fn offset_up_to(i: u32) -> f32 {
     return before_block(i / BLOCK) + point_offsets[i];
 }
 
+// A piece of the line for point i: another one of the same block, whose size is a power of two. The multiplier is odd, so each piece comes once.
+fn shuffled(i: u32, count: u32) -> u32 {
+    let block = 1u << (clamp(firstLeadingBit(count), 10u, 16u) - 6u);
+    let first = i & ~(block - 1u);
+    if first + block > count {
+        return i;
+    }
+    let random = hash3(first, seed.value, 2u);
+    return first + ((i * (random | 1u) + (random >> 16u)) & (block - 1u));
+}
+
+// The place `t` (0…1) on a line that fills a triangle and gives equal lengths equal areas: each base-4 digit picks one of the four triangles
+// between the corners and the middles of the edges (after Basu and Owen 2015); the centre of the last one. An f32 has 12 digits.
+fn on_triangle(triangle: Corners, t: f32) -> vec3f {
+    var corners = triangle;
+    var rest = t;
+    for (var level = 0u; level < 12u; level++) {
+        rest *= 4.0;
+        let digit = min(floor(rest), 3.0);
+        rest -= digit;
+        let ab = 0.5 * (corners.a + corners.b);
+        let bc = 0.5 * (corners.b + corners.c);
+        let ca = 0.5 * (corners.c + corners.a);
+        switch u32(digit) {
+            case 0u: { corners = Corners(corners.a, ab, ca); }
+            case 1u: { corners = Corners(ab, corners.b, bc); }
+            case 2u: { corners = Corners(bc, ca, ab); }
+            default: { corners = Corners(ca, bc, corners.c); }
+        }
+    }
+    return (corners.a + corners.b + corners.c) / 3.0;
+}
+
 @compute @workgroup_size(64)
 fn emit(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     let i = linear_index(id, groups, 64u);
@@ -165,11 +199,8 @@ fn emit(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
     if i >= count || total <= 0.0 {
         return;
     }
-    // Point i goes to map i mod k: each map's points are a low-discrepancy sequence over the whole weight, with a shift of its own.
-    // (A sequence over i itself would put all points of a map side by side where k is a power of its base.)
-    let map = i % params.clusters;
-    let nth = i / params.clusters;
-    let at = min(fract(radical_inverse_2(nth) + unit_float(hash3(map, seed.value, 1u))), 0x1.fffffep-1) * total;
+    let place = f32(shuffled(i, count)) + unit_float(hash3(i, seed.value, 1u));
+    let at = min(place / f32(count), 0x1.fffffep-1) * total;
     var low = 0u;
     var high = triangles - 1u;
     while low < high {
@@ -186,18 +217,14 @@ fn emit(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
         previous = offset_up_to(low - 1u);
     }
     let weight = offset_up_to(low) - previous;
-    // Uniform in the triangle: a square folded over its diagonal. What is left of the choice of the triangle is uniform as well.
-    var uv = vec2f(saturate((at - previous) / weight), fract(radical_inverse_3(nth) + unit_float(hash3(map, seed.value, 2u))));
-    if uv.x + uv.y > 1.0 {
-        uv = 1.0 - uv;
-    }
     let normal = cross(t.b - t.a, t.c - t.a);
     let twice_area = length(normal);
     if twice_area <= 0.0 || weight <= 0.0 {
         return;
     }
     var point: ScenePoint;
-    point.position = t.a + (t.b - t.a) * uv.x + (t.c - t.a) * uv.y;
+    // What is left of the choice of the triangle is uniform as well.
+    point.position = on_triangle(t, saturate((at - previous) / weight));
     point.normal = normal / twice_area;
     // The triangle's area over its expected number of points.
     point.area = 0.5 * twice_area / (weight / total * f32(count));

@@ -153,7 +153,7 @@ fn tessellation_is_as_its_twin() {
                 triangles.len()
             );
             let nodes = format!(
-                "(id: \"points\", node: \"points/dynamic\", params: {{\"clusters\": 16, \"method\": \"tessellation\", \"smoothstep\": \"{order}\"}}),
+                "(id: \"points\", node: \"points/dynamic\", params: {{\"method\": \"tessellation\", \"smoothstep\": \"{order}\"}}),
                 (id: \"show\", node: \"test/show\")"
             );
             world.add("pipelines/test.ron", &pipeline(&resources, &nodes, "picture"));
@@ -190,4 +190,56 @@ fn tessellation_is_as_its_twin() {
         }
     }
     judge(vec![outcome]);
+}
+
+/// Point i belongs to map i mod N, and pipelines choose N: each map must see all of the surface.
+#[test]
+fn dynamic_points_are_even_in_each_map() {
+    const SIDE: u32 = 32;
+    const COUNT: u32 = 16384;
+    // Rows of a grid, whose period meets numbers of maps.
+    let vertex = |i: u32| Vertex { position: Vec3::new((i % (SIDE + 1)) as f32, 0.0, (i / (SIDE + 1)) as f32), u: 0.0, normal: Vec3::Y, v: 0.0 };
+    let triangles: Vec<Triangle> = (0..SIDE * SIDE)
+        .flat_map(|i| {
+            let a = i / SIDE * (SIDE + 1) + i % SIDE;
+            [[a, a + 1, a + SIDE + 2], [a, a + SIDE + 2, a + SIDE + 1]].map(|[a, b, c]| Triangle { a, b, c, object: 0, material: 0 })
+        })
+        .collect();
+    let info = SceneInfo { triangle_count: triangles.len() as u32, ..SceneInfo::default() };
+    let mut world = World::new(vec![
+        Resource::buffer("scene_vertices", "Vertex", &(0..(SIDE + 1) * (SIDE + 1)).map(vertex).collect::<Vec<_>>()),
+        Resource::buffer("scene_triangles", "Triangle", &triangles),
+        Resource::buffer("scene_objects", "Object", &[Object { world_from_object: Mat4::IDENTITY, normal_from_object: Mat4::IDENTITY }]),
+        Resource::uniform("scene_info", "SceneInfo", &info),
+        Resource::uniform("seed", "Seed", &gpu_data::Seed::default()),
+    ]);
+    world.add_node("points/dynamic");
+    world.add_picture();
+    let resources = format!(
+        "\"points\": Buffer(of: \"ScenePoint\", count: {COUNT}), \"point_offsets\": Buffer(of: \"f32\", count: {0}),
+        \"point_block_sums\": Buffer(of: \"f32\", count: {0}), \"picture\": Texture(format: Rgba32Float, size: Fixed(1, 1))",
+        triangles.len()
+    );
+    let nodes = "(id: \"points\", node: \"points/dynamic\"), (id: \"show\", node: \"test/show\")";
+    world.add("pipelines/test.ron", &pipeline(&resources, nodes, "picture"));
+    let ran = world.run("points/dynamic", &["points"]);
+    let points = ran.numbers("points");
+    // 16 equal squares of the grid.
+    let squares: Vec<usize> = points.chunks_exact(8).map(|p| (p[0] / 8.0) as usize + 4 * (p[2] / 8.0) as usize).collect();
+    let deviation = |maps: usize| {
+        let (mut found, mut random) = (0.0, 0.0);
+        for map in 0..maps {
+            let mut counts = [0.0_f64; 16];
+            squares.iter().skip(map).step_by(maps).for_each(|square| counts[*square] += 1.0);
+            let of_map: f64 = counts.iter().sum();
+            found += counts.iter().map(|count| (count - of_map / 16.0).powi(2)).sum::<f64>();
+            random += of_map * (1.0 - 1.0 / 16.0);
+        }
+        found / random
+    };
+    for maps in [16, 32, 64, 96, 100, 128, 233, 377] {
+        let ratio = deviation(maps);
+        // Independent random points: 1. Stratified in blocks of 256 of 16384, a map's points vary within a block alone.
+        assert!(ratio < 0.6, "{maps} maps: the variance of points in a square is {ratio} of that of random ones");
+    }
 }
