@@ -72,7 +72,12 @@ const FRAMES: u32 = 4;
 
 /// The Cornell boxes, small.
 fn cornell(name: &str) -> Job {
-    Job { size: (48, 48), ..Job::asset(name) }.frames(FRAMES).set("rsm_size", 128).set("ism_size", 64).set("clusters", 256).keep(&["indirect"])
+    Job { size: (48, 48), ..Job::asset(name) }
+        .frames(FRAMES)
+        .set("rsm_size", 128)
+        .set("ism_size", 64)
+        .set("clusters", 256)
+        .keep(&["indirect"])
 }
 
 fn traced(name: &str, component: &str) -> manylight_gpu::Image {

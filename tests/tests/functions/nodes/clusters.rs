@@ -198,7 +198,8 @@ fn dynamic_points_are_even_in_each_map() {
     const SIDE: u32 = 32;
     const COUNT: u32 = 16384;
     // Rows of a grid, whose period meets numbers of maps.
-    let vertex = |i: u32| Vertex { position: Vec3::new((i % (SIDE + 1)) as f32, 0.0, (i / (SIDE + 1)) as f32), u: 0.0, normal: Vec3::Y, v: 0.0 };
+    let vertex =
+        |i: u32| Vertex { position: Vec3::new((i % (SIDE + 1)) as f32, 0.0, (i / (SIDE + 1)) as f32), u: 0.0, normal: Vec3::Y, v: 0.0 };
     let triangles: Vec<Triangle> = (0..SIDE * SIDE)
         .flat_map(|i| {
             let a = i / SIDE * (SIDE + 1) + i % SIDE;
