@@ -271,10 +271,10 @@ fn every_pipeline_stays_stable_on_hard_scenes() {
                     continue;
                 }
             }
+            on_scenes += 1;
             let mut images = Vec::new();
             for light in lights_to_show(&documents, &scene.1, SIZE) {
                 tried += 1;
-                on_scenes += 1;
                 match render(&subject, scene, &small, light) {
                     Ok(image) => images.push(image),
                     Err(told) => faults.push(format!("{path} {told}")),
