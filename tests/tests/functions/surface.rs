@@ -145,7 +145,9 @@ fn number(pixel: vec4f, at: u32) -> f32 {{ return bitcast<f32>(arguments[(u32(pi
             writeln!(shader, "    corner.{name}{place} = {value};").expect("a string");
         }
     }
-    shader.push_str("    return describe_surface(corner, vec3f(number(at, 9u), number(at, 10u), number(at, 11u)), number(at, 12u));\n}\n");
+    shader.push_str(
+        "    return describe_surface(corner, vec3f(number(at, 9u), number(at, 10u), number(at, 11u)), number(at, 12u), true);\n}\n",
+    );
     world.add("shaders/test/draw.wgsl", &shader);
     world.add(
         "shaders/test/draw.ron",
