@@ -8,4 +8,4 @@ mod world;
 
 pub use case::{Case, check};
 pub use comparison::{Bound, EXACT, Outcome, Want, absolute, judge, relative, ulps, values, values_of};
-pub use world::{Resource, World, modules};
+pub use world::{Ran, Resource, World, modules};

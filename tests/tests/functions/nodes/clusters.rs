@@ -5,7 +5,7 @@ use manylight_graph::value::Format;
 use manylight_scene::gpu_data::{self, LightView, Object, SceneInfo, Triangle, Vertex};
 
 use super::{
-    super::harness::{Outcome, Resource, Want, World, judge, relative},
+    super::harness::{Outcome, Ran, Resource, Want, World, judge, relative},
     Cluster, noise, pipeline,
 };
 
@@ -92,6 +92,31 @@ fn the_comparison_of_clusters_is_as_its_twin() {
     judge(vec![outcome]);
 }
 
+/// What `points/dynamic` makes of triangles between places of the world; `info` without their number.
+fn points_on(places: &[Vec3], triangles: &[[u32; 3]], info: SceneInfo, count: u32, params: &str) -> Ran {
+    let vertex = |p: &Vec3| Vertex { position: *p, u: 0.0, normal: Vec3::ZERO, v: 0.0 };
+    let triangle = |[a, b, c]: &[u32; 3]| Triangle { a: *a, b: *b, c: *c, object: 0, material: 0 };
+    let info = SceneInfo { triangle_count: triangles.len() as u32, ..info };
+    let mut world = World::new(vec![
+        Resource::buffer("scene_vertices", "Vertex", &places.iter().map(vertex).collect::<Vec<_>>()),
+        Resource::buffer("scene_triangles", "Triangle", &triangles.iter().map(triangle).collect::<Vec<_>>()),
+        Resource::buffer("scene_objects", "Object", &[Object { world_from_object: Mat4::IDENTITY, normal_from_object: Mat4::IDENTITY }]),
+        Resource::uniform("scene_info", "SceneInfo", &info),
+        Resource::uniform("seed", "Seed", &gpu_data::Seed::default()),
+    ]);
+    world.add_node("points/dynamic");
+    world.add_picture();
+    let resources = format!(
+        "\"points\": Buffer(of: \"ScenePoint\", count: {count}), \"point_offsets\": Buffer(of: \"f32\", count: {}),
+        \"point_block_sums\": Buffer(of: \"f32\", count: {}), \"picture\": Texture(format: Rgba32Float, size: Fixed(1, 1))",
+        triangles.len(),
+        triangles.len().div_ceil(256)
+    );
+    let nodes = format!("(id: \"points\", node: \"points/dynamic\", params: {{{params}}}), (id: \"show\", node: \"test/show\")");
+    world.add("pipelines/test.ron", &pipeline(&resources, &nodes, "picture"));
+    world.run("points/dynamic", &["points", "point_offsets"])
+}
+
 /// [ACRSM] eqs. 5.3 and 5.4: what a triangle weighs.
 #[test]
 fn tessellation_is_as_its_twin() {
@@ -128,36 +153,9 @@ fn tessellation_is_as_its_twin() {
             let edges: Vec<f64> = triangles.iter().flat_map(edges_of).collect();
             let range = |all: &[f64]| (all.iter().copied().fold(f64::MAX, f64::min) as f32, all.iter().copied().fold(0.0, f64::max) as f32);
             let ((area_min, area_max), (edge_min, edge_max)) = (range(&areas), range(&edges));
-            let info = SceneInfo { area_min, area_max, edge_min, edge_max, triangle_count: triangles.len() as u32, ..SceneInfo::default() };
-            let vertex = |p: &Vec3| Vertex { position: *p, u: 0.0, normal: Vec3::ZERO, v: 0.0 };
-            let mut world = World::new(vec![
-                Resource::buffer("scene_vertices", "Vertex", &places.iter().map(vertex).collect::<Vec<_>>()),
-                Resource::buffer(
-                    "scene_triangles",
-                    "Triangle",
-                    &triangles.iter().map(|[a, b, c]| Triangle { a: *a, b: *b, c: *c, object: 0, material: 0 }).collect::<Vec<_>>(),
-                ),
-                Resource::buffer(
-                    "scene_objects",
-                    "Object",
-                    &[Object { world_from_object: Mat4::IDENTITY, normal_from_object: Mat4::IDENTITY }],
-                ),
-                Resource::uniform("scene_info", "SceneInfo", &info),
-                Resource::uniform("seed", "Seed", &gpu_data::Seed::default()),
-            ]);
-            world.add_node("points/dynamic");
-            world.add_picture();
-            let resources = format!(
-                "\"points\": Buffer(of: \"ScenePoint\", count: 4096), \"point_offsets\": Buffer(of: \"f32\", count: {}),
-                \"point_block_sums\": Buffer(of: \"f32\", count: 1), \"picture\": Texture(format: Rgba32Float, size: Fixed(1, 1))",
-                triangles.len()
-            );
-            let nodes = format!(
-                "(id: \"points\", node: \"points/dynamic\", params: {{\"method\": \"tessellation\", \"smoothstep\": \"{order}\"}}),
-                (id: \"show\", node: \"test/show\")"
-            );
-            world.add("pipelines/test.ron", &pipeline(&resources, &nodes, "picture"));
-            let ran = world.run("points/dynamic", &["points", "point_offsets"]);
+            let info = SceneInfo { area_min, area_max, edge_min, edge_max, ..SceneInfo::default() };
+            let params = format!("\"method\": \"tessellation\", \"smoothstep\": \"{order}\"");
+            let ran = points_on(&places, &triangles, info, 4096, &params);
             let sums = ran.numbers("point_offsets");
             // Least and greatest of what rounding allows: a factor is rounded up.
             let factor = |value: f64, low: f32, high: f32, slack: f64| {
@@ -198,32 +196,15 @@ fn dynamic_points_are_even_in_each_map() {
     const SIDE: u32 = 32;
     const COUNT: u32 = 16384;
     // Rows of a grid, whose period meets numbers of maps.
-    let vertex =
-        |i: u32| Vertex { position: Vec3::new((i % (SIDE + 1)) as f32, 0.0, (i / (SIDE + 1)) as f32), u: 0.0, normal: Vec3::Y, v: 0.0 };
-    let triangles: Vec<Triangle> = (0..SIDE * SIDE)
+    let places: Vec<Vec3> =
+        (0..(SIDE + 1) * (SIDE + 1)).map(|i| Vec3::new((i % (SIDE + 1)) as f32, 0.0, (i / (SIDE + 1)) as f32)).collect();
+    let triangles: Vec<[u32; 3]> = (0..SIDE * SIDE)
         .flat_map(|i| {
             let a = i / SIDE * (SIDE + 1) + i % SIDE;
-            [[a, a + 1, a + SIDE + 2], [a, a + SIDE + 2, a + SIDE + 1]].map(|[a, b, c]| Triangle { a, b, c, object: 0, material: 0 })
+            [[a, a + 1, a + SIDE + 2], [a, a + SIDE + 2, a + SIDE + 1]]
         })
         .collect();
-    let info = SceneInfo { triangle_count: triangles.len() as u32, ..SceneInfo::default() };
-    let mut world = World::new(vec![
-        Resource::buffer("scene_vertices", "Vertex", &(0..(SIDE + 1) * (SIDE + 1)).map(vertex).collect::<Vec<_>>()),
-        Resource::buffer("scene_triangles", "Triangle", &triangles),
-        Resource::buffer("scene_objects", "Object", &[Object { world_from_object: Mat4::IDENTITY, normal_from_object: Mat4::IDENTITY }]),
-        Resource::uniform("scene_info", "SceneInfo", &info),
-        Resource::uniform("seed", "Seed", &gpu_data::Seed::default()),
-    ]);
-    world.add_node("points/dynamic");
-    world.add_picture();
-    let resources = format!(
-        "\"points\": Buffer(of: \"ScenePoint\", count: {COUNT}), \"point_offsets\": Buffer(of: \"f32\", count: {0}),
-        \"point_block_sums\": Buffer(of: \"f32\", count: {0}), \"picture\": Texture(format: Rgba32Float, size: Fixed(1, 1))",
-        triangles.len()
-    );
-    let nodes = "(id: \"points\", node: \"points/dynamic\"), (id: \"show\", node: \"test/show\")";
-    world.add("pipelines/test.ron", &pipeline(&resources, nodes, "picture"));
-    let ran = world.run("points/dynamic", &["points"]);
+    let ran = points_on(&places, &triangles, SceneInfo::default(), COUNT, "");
     let points = ran.numbers("points");
     // 16 equal squares of the grid.
     let squares: Vec<usize> = points.chunks_exact(8).map(|p| (p[0] / 8.0) as usize + 4 * (p[2] / 8.0) as usize).collect();
